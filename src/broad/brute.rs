@@ -1,5 +1,5 @@
-//! Brute force: every pair of bodies, every update. The twin that the other methods are tested against, and the
-//! quickest method for a handful of bodies.
+//! Brute force: every pair of bodies, every update. The reference that the other methods are tested against, and the
+//! fastest method for a handful of bodies.
 
 use super::Proxies;
 use super::commit::{Found, Judge};
@@ -8,7 +8,7 @@ use crate::ids::PairKey;
 use crate::pairs::{PairPolicy, PairSet};
 use crate::wire::EndCause;
 
-/// Looks at every pair and reads every box from the caller, so that it shares no shortcut with the other methods.
+/// Tests every pair and reads every box from the caller, so that it shares no shortcut with the other methods.
 ///
 /// Cost: O(n^2 + k).
 pub(super) fn update(

@@ -1,8 +1,8 @@
-//! From suggestions to the pair set: one place decides, for every method, which pairs end, begin or do not fit.
+//! From suggested pairs to the pair set: one place decides, for every method, which pairs end, begin or do not fit.
 //!
-//! In: keys that a method found (in any order, doubled, already stored, not allowed: all the same), of boxes that
-//! overlap or of some that only may, and pairs whose end has a cause. Out: the pair set changed and the delta filled,
-//! both in the order of body ids. Slots of pairs therefore depend neither on the method nor on the slots of bodies.
+//! In: keys that a method found (in any order; duplicates, stored pairs and forbidden pairs are allowed), of boxes that
+//! overlap or only may, and pairs whose end has a cause. Out: the changed pair set and the filled delta, both in the
+//! order of body ids. So pair slots depend neither on the method nor on body slots.
 
 use super::Proxies;
 use super::forced::Forced;
@@ -14,13 +14,13 @@ use crate::pairs::{Ended, PairDelta, PairPolicy, PairSet};
 use crate::simd::boxes::prefetch;
 use crate::wire::EndCause;
 
-/// How many pairs ahead memory is asked for.
+/// How many pairs ahead memory is prefetched.
 const AHEAD: usize = 8;
 
-/// What an update has found so far; memory is kept over updates.
+/// What an update has found so far; the memory is kept across updates.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Found {
-    /// Pairs of boxes that overlap, and some that no box decides.
+    /// Pairs of boxes that overlap, and some that do not depend on boxes.
     pub(super) began: Vec<PairKey>,
     /// Pairs of boxes that may overlap.
     pub(super) maybe: Vec<PairKey>,
@@ -28,19 +28,19 @@ pub(super) struct Found {
     ended: Vec<((BodyId, BodyId), Ended)>,
     /// Pairs taken out of the set because their boxes parted, in the order of the delta.
     parted: Vec<Ended>,
-    /// Memory for those that look at each stored pair.
+    /// Scratch memory for passes over all stored pairs.
     pub(super) slots: Vec<PairSlot>,
-    /// Stored pairs that end, and why.
+    /// Stored pairs that end, with their cause.
     pub(super) doomed: Vec<(PairSlot, EndCause)>,
     /// Bodies that were truncated before this update.
     truncated: Vec<BodySlot>,
     sort: IdSort,
 }
 
-/// What decides on a pair.
+/// Everything needed to decide on a pair.
 #[derive(Debug)]
 pub(super) struct Judge<'a, X, P> {
-    /// Who is in, and kinds.
+    /// Bodies that are in, and their kinds.
     pub(super) members: &'a Members,
     /// Boxes.
     pub(super) proxies: &'a X,
@@ -65,7 +65,7 @@ impl<'a, X: Proxies, P: PairPolicy> Judge<'a, X, P> {
         }
     }
 
-    /// Whether something else than the boxes keeps the pair a candidate: a rule, or a body without a box.
+    /// Returns whether a rule, or a body without a box, keeps the pair a candidate whatever the boxes say.
     fn is_unconditional(&self, key: PairKey) -> bool {
         let (low, high) = key.slots();
         let one = self.members.has(low, UNBOUNDED);
@@ -77,13 +77,13 @@ impl<'a, X: Proxies, P: PairPolicy> Judge<'a, X, P> {
         }
     }
 
-    /// Whether both bodies are in.
+    /// Returns whether both bodies are in.
     fn is_inside(&self, key: PairKey) -> bool {
         let (low, high) = key.slots();
         self.members.has(low, IN) && self.members.has(high, IN)
     }
 
-    /// Whether two bodies with boxes meet.
+    /// Returns whether both bodies have boxes and these overlap.
     fn overlaps(&self, key: PairKey) -> bool {
         let (low, high) = key.slots();
         self.members.is_bounded(low)
@@ -91,7 +91,7 @@ impl<'a, X: Proxies, P: PairPolicy> Judge<'a, X, P> {
             && self.proxies.aabb(low).overlaps(self.proxies.aabb(high))
     }
 
-    /// Asks for the boxes of a pair to be brought near.
+    /// Prefetches the boxes of a pair.
     #[inline]
     fn prefetch(&self, key: PairKey) {
         let (low, high) = key.slots();
@@ -102,7 +102,7 @@ impl<'a, X: Proxies, P: PairPolicy> Judge<'a, X, P> {
         }
     }
 
-    /// Whether a pair that is not stored must be, if it is one of [`Found::began`].
+    /// Returns whether a pair that is not stored must be, given that it is one of [`Found::began`].
     fn begins(&self, key: PairKey) -> bool {
         let (low, high) = key.slots();
         let inside = self.is_inside(key);
@@ -115,14 +115,14 @@ impl<'a, X: Proxies, P: PairPolicy> Judge<'a, X, P> {
             && self.policy.allows(low, high)
     }
 
-    /// Whether a stored pair whose boxes have parted ends.
+    /// Returns whether a stored pair whose boxes have parted ends.
     fn lets_go(&self, key: PairKey) -> bool {
         debug_assert!(!self.overlaps(key), "{key:?} was told to have parted");
         let (low, high) = key.slots();
         !self.is_unconditional(key) && !self.policy.keeps(low) && !self.policy.keeps(high)
     }
 
-    /// Why a stored pair ends; `None` when it stays. Filters are asked only if `refiltered`.
+    /// Why a stored pair ends; `None` when it stays. Filters are checked only if `refiltered`.
     pub(super) fn ends(&self, key: PairKey, refiltered: bool) -> Option<EndCause> {
         let (low, high) = key.slots();
         if refiltered && !self.policy.allows(low, high) {
@@ -137,24 +137,24 @@ impl<'a, X: Proxies, P: PairPolicy> Judge<'a, X, P> {
 }
 
 impl Found {
-    /// Pairs that were told to begin, or may.
+    /// Number of pairs reported as beginning, or that may begin.
     pub(super) fn told(&self) -> u64 {
         (self.began.len() + self.maybe.len()) as u64
     }
 
-    /// Pairs that this update found.
+    /// Number of pairs that this update found.
     pub(super) fn used(&self) -> usize {
         self.began.len() + self.maybe.len() + self.ended.len() + self.parted.len()
     }
 
-    /// Room for pairs that are found.
+    /// Capacity for found pairs.
     pub(super) fn room(&self) -> usize {
         let lists = [self.began.capacity(), self.maybe.capacity()];
         let ended = [self.ended.capacity(), self.parted.capacity()];
         lists.into_iter().chain(ended).sum::<usize>() + self.sort.capacity()
     }
 
-    /// Ends an update: what it needed more of than most do is given back.
+    /// Ends an update: gives back memory that it needed beyond what most updates do.
     pub(super) fn close_tick(&mut self, bodies: usize) {
         give_back(&mut self.began, bodies);
         give_back(&mut self.maybe, bodies);
@@ -165,7 +165,7 @@ impl Found {
         self.sort.close_tick(bodies);
     }
 
-    /// Takes a stored pair out.
+    /// Removes a stored pair.
     pub(super) fn end(
         &mut self,
         slot: PairSlot,
@@ -179,7 +179,7 @@ impl Found {
         }
     }
 
-    /// Takes out the stored pairs of boxes that parted, unless something else keeps them.
+    /// Removes the stored pairs of boxes that parted, unless something else keeps them.
     pub(super) fn part(
         &mut self,
         parted: &mut [PairKey],
@@ -193,8 +193,8 @@ impl Found {
 
     /// Stores what begins and fills the delta.
     ///
-    /// * `waits` - pairs are missing that are not counted in this tick: whether a pair of two bodies that miss some is
-    ///   one of them, nobody knows before they are.
+    /// * `waits` - pairs are missing that are not counted in this tick. Until they are, a pair of two bodies that both
+    ///   miss some may be one of them.
     pub(super) fn commit(
         &mut self,
         judge: &Judge<'_, impl Proxies, impl PairPolicy>,
@@ -221,14 +221,14 @@ impl Found {
             pairs.go_on_missing(missing, &self.truncated);
         }
         pairs.insert_all(&self.began, |key| judge.begins(key), &mut delta.began);
-        // What a body of unknown place misses cannot be found again by boxes: with whom it would be paired is not
-        // known any more, so all who missed a pair stay marked, and what was missing may still be.
+        // The missing pairs of a body of unknown place cannot be found again by boxes: its partners are not known any
+        // more. So all bodies that missed a pair stay marked, and the old number of missing pairs is kept.
         if self.truncated.iter().any(|slot| judge.policy.keeps(*slot)) {
             pairs.go_on_missing(missing, &self.truncated);
         }
     }
 
-    /// Tells of all that was taken out: each of the two lists is in order, or few.
+    /// Reports all removed pairs. `parted` is in order; the others are few.
     fn tell_ended(&mut self, members: &Members, told: &mut Vec<Ended>) {
         self.ended.sort_unstable_by_key(|(rank, _)| *rank);
         let mut parted = &self.parted[..];
@@ -242,7 +242,7 @@ impl Found {
         told.extend_from_slice(parted);
     }
 
-    /// Puts what may have to be stored in the order of ids, each once.
+    /// Collects the pairs that may have to be stored, in the order of ids, without duplicates.
     fn gather(&mut self, judge: &Judge<'_, impl Proxies, impl PairPolicy>, limit: usize) {
         for (at, key) in self.maybe.iter().enumerate() {
             if let Some(ahead) = self.maybe.get(at + AHEAD) {
@@ -253,7 +253,7 @@ impl Found {
                 self.began.push(*key);
             }
         }
-        // Of more than the set could hold those that filters forbid are not sorted.
+        // If there are more than the set can hold, pairs that filters forbid are dropped before the sort.
         if self.began.len() > limit {
             self.began.retain(|key| judge.begins(*key));
         }

@@ -1,11 +1,11 @@
-//! The methods behind one name.
+//! One enum over all methods.
 
 use super::Method;
 use super::grid::{Grid, Kind};
 use super::order::Order;
 use super::sap::Sap;
 
-/// The method at work.
+/// The method in use.
 #[derive(Clone, Debug)]
 pub(super) enum Engine {
     Brute,
@@ -36,7 +36,7 @@ impl Engine {
         }
     }
 
-    /// Whether it goes through copies of the boxes.
+    /// Returns whether the method works on copies of the boxes.
     pub(super) fn copies_boxes(&self) -> bool {
         matches!(self, Self::Sap(_) | Self::Grid(_))
     }

@@ -1,6 +1,6 @@
 //! Pairs that are candidates whatever the boxes say: those of a rule with a larger `report_within_m`.
 //!
-//! In: the whole list when it changed. Out: which keys to look at in the next update, and lookups.
+//! In: the whole list when it changed. Out: which keys to test in the next update, and lookups.
 
 use crate::ids::{BodySlot, PairKey};
 
@@ -9,14 +9,14 @@ use crate::ids::{BodySlot, PairKey};
 pub(super) struct Forced {
     /// Sorted.
     keys: Vec<PairKey>,
-    /// Each pair twice, from either body; sorted.
+    /// Each pair twice, once under each body; sorted.
     sides: Vec<(BodySlot, BodySlot)>,
     /// Keys that came or went since the last update.
     changed: Vec<PairKey>,
 }
 
 impl Forced {
-    /// Takes the whole new list.
+    /// Replaces the whole list.
     pub(super) fn replace(&mut self, keys: &[PairKey]) {
         self.changed.append(&mut self.keys);
         self.keys.extend_from_slice(keys);
@@ -31,7 +31,7 @@ impl Forced {
         self.sides.sort_unstable();
     }
 
-    /// Whether the pair is forced.
+    /// Returns whether the pair is forced.
     pub(super) fn has(&self, key: PairKey) -> bool {
         self.keys.binary_search(&key).is_ok()
     }
@@ -50,7 +50,7 @@ impl Forced {
         &self.changed
     }
 
-    /// The changes have been looked at.
+    /// Marks the changes as handled.
     pub(super) fn settle(&mut self) {
         self.changed.clear();
     }

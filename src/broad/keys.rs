@@ -1,24 +1,24 @@
-//! Puts keys of pairs in order: by digits, the lowest first, with no branch that depends on a key.
+//! Radix sort for pair keys: by digits, the lowest first, with no branch that depends on a key.
 //!
-//! Results are in the order of ids. As a rule these ascend with slots, and keys are in their order as they are; after
-//! the first slot that was used again, or with ids of the user's choice, they are not. Then each body has a number in
-//! the order of ids, and the keys of these numbers are what is sorted. The numbers last until another id is in a slot.
+//! Results are in the order of ids. Usually ids ascend with slots, and keys can be sorted as they are. Once a slot was
+//! reused, or with ids chosen by the user, they do not: then each body gets a number in the order of ids, and keys made
+//! of these numbers are sorted. The numbers stay valid until a slot gets another id.
 
 use super::members::Members;
 use super::order::give_back;
 use crate::ids::{BodyId, BodySlot, PairKey, small};
 
-/// Fewer are sorted by comparing them.
+/// Shorter lists are sorted by comparison.
 const FEW: usize = 256;
-/// More are sorted in place: a pass takes twice the memory of the list.
+/// Longer lists are sorted in place: a pass takes twice the memory of the list.
 const MANY: usize = 1 << 23;
-/// Most bits of a digit: the counts of a pass stay in the first cache.
+/// Most bits of a digit: the counts of a pass stay in the first-level cache.
 const DIGIT_BITS_MAX: u32 = 12;
 
-/// Memory of the sort, kept over calls.
+/// Memory of the sort, kept across calls.
 #[derive(Clone, Debug, Default)]
 pub(super) struct KeySort {
-    /// The keys without the bits that none has; and where a pass puts them.
+    /// The keys without the bits that no key uses; and the output of a pass.
     words: Vec<u64>,
     spare: Vec<u64>,
     /// By pass and digit: where the next key with that digit goes.
@@ -37,7 +37,7 @@ impl KeySort {
             [lows | low.0, highs | high.0]
         });
         let [low_bits, high_bits] = used.map(|used| u32::BITS - used.leading_zeros());
-        // As many passes as digits of the size of the list make: more counts than keys are no gain.
+        // Digits are no wider than log2 of the list's length: more counts than keys gain nothing.
         let bits = (low_bits + high_bits).max(1);
         let passes = bits.div_ceil(keys.len().ilog2().min(DIGIT_BITS_MAX));
         let digit_bits = bits.div_ceil(passes);
@@ -83,7 +83,7 @@ impl KeySort {
         }
     }
 
-    /// Ends an update: what it needed more of than most do is given back.
+    /// Ends an update: gives back memory that it needed beyond what most updates do.
     pub(super) fn close_tick(&mut self, bodies: usize) {
         give_back(&mut self.words, bodies);
         give_back(&mut self.spare, bodies);
@@ -97,12 +97,12 @@ pub(super) struct IdSort {
     /// By slot: the body's number in the order of ids; and by number, the slot.
     numbers: Vec<u32>,
     slots: Vec<BodySlot>,
-    /// The state of the slots' ids that the numbers are of.
+    /// Version of the slots' ids that the numbers were made from.
     named: u64,
-    /// The state of the slots' ids in the last update, and keys that were sorted without numbers since it is so.
+    /// Version of the slots' ids in the last update, and keys sorted without numbers since that version.
     seen: u64,
     owed: usize,
-    /// Keys with their ids, where there are no numbers.
+    /// Keys with their ids, used while there are no numbers.
     ranked: Vec<((BodyId, BodyId), PairKey)>,
 }
 
@@ -132,8 +132,8 @@ impl IdSort {
         }
     }
 
-    /// Whether there are numbers; they are made when as many keys were sorted without them as there are slots: where
-    /// ids change in each tick and few pairs do, they would cost more than they spare.
+    /// Returns whether there are numbers. They are made once as many keys were sorted without them as there are slots:
+    /// where ids change in each tick and few pairs do, they would cost more than they save.
     fn has_numbers(&mut self, keys: usize, members: &Members) -> bool {
         let (named, ids) = (members.named(), members.ids());
         if self.named == named {
@@ -149,7 +149,7 @@ impl IdSort {
         self.named = named;
         self.slots.clear();
         self.slots.extend((0..ids.len()).map(BodySlot::at));
-        // Of a body that left the id may be another's by now.
+        // The id of a body that left may belong to another by now.
         (self.slots).sort_unstable_by_key(|slot| (ids[slot.index()], *slot));
         self.numbers.clear();
         self.numbers.resize(ids.len(), 0);
@@ -159,12 +159,12 @@ impl IdSort {
         true
     }
 
-    /// Room for so many keys.
+    /// Capacity in keys.
     pub(super) fn capacity(&self) -> usize {
         self.sort.words.capacity() + self.sort.spare.capacity() + self.ranked.capacity()
     }
 
-    /// Ends an update: what it needed more of than most do is given back.
+    /// Ends an update: gives back memory that it needed beyond what most updates do.
     pub(super) fn close_tick(&mut self, bodies: usize) {
         self.sort.close_tick(bodies);
         give_back(&mut self.ranked, bodies);
@@ -177,7 +177,7 @@ mod tests {
     use crate::broad::Proxies;
     use crate::math::Aabb;
 
-    /// Bodies by slot, of which nothing but ids is asked.
+    /// Bodies by slot; only their ids are read.
     struct Named(Vec<u64>, Aabb);
 
     impl Proxies for Named {

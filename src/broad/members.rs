@@ -1,26 +1,26 @@
-//! What the broad phase knows of its bodies: a copy of each box, the id, and what this tick did to it.
+//! What the broad phase knows about its bodies: a copy of each box, the id, and what this tick changed.
 //!
-//! In: slots and the caller's [`Proxies`]. Out: boxes in an array by slot, for the methods that go through boxes by
-//! slot (a body is some hundred bytes, a box 48); the others read them where they are.
+//! In: slots and the caller's [`Proxies`]. Out: boxes in an array by slot, for the methods that scan boxes by slot (a
+//! body is some hundred bytes, a box 48); the other methods read them in place.
 
 use super::Proxies;
 use super::order::give_back;
 use crate::ids::{BodyId, BodySlot, PairKey, small};
 use crate::math::Aabb;
 
-/// It is in the broad phase.
+/// The body is in the broad phase.
 pub(super) const IN: u8 = 1;
-/// It has no box: it is paired with every bounded body that the filters allow.
+/// The body has no box: it is paired with every bounded body that the filters allow.
 pub(super) const UNBOUNDED: u8 = 2;
 /// Its box may have changed in this tick.
 pub(super) const MOVED: u8 = 4;
-/// All of its pairs must be looked for, whatever moved.
+/// All of its pairs must be searched, even if nothing moved.
 pub(super) const ASKED: u8 = 8;
-/// Its stored pairs must be asked of the filters again.
+/// Its stored pairs must be filtered again.
 pub(super) const REFILTERED: u8 = 16;
 /// It left in this tick (and may have come back since).
 pub(super) const LEFT: u8 = 32;
-/// It came in this tick: no structure knows it yet.
+/// It came in this tick: no structure has it yet.
 pub(super) const CAME: u8 = 64;
 
 /// A box as plain arrays: lower corner, upper corner, metres. Closed.
@@ -33,13 +33,13 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// Holds nothing.
+    /// Contains nothing.
     const EMPTY: Self = Self {
         min: [f64::INFINITY; 3],
         max: [f64::NEG_INFINITY; 3],
     };
 
-    /// From a box. NaN is stopped at the door of the world; should one come, it overlaps nothing.
+    /// From a box. NaN is rejected at the entrance of the world; if one came through, it would overlap nothing.
     fn of(aabb: &Aabb) -> Self {
         debug_assert!(
             (0..3).all(|k| aabb.min[k] <= aabb.max[k]),
@@ -57,10 +57,10 @@ impl Bounds {
         side(0).max(side(1)).max(side(2))
     }
 
-    /// Whether the closed intervals on one axis meet.
+    /// Returns whether the closed intervals on one axis overlap.
     #[inline]
     pub(super) fn meets(&self, other: &Self, axis: usize) -> bool {
-        // `&`, not `&&`: two loads that wait for each other cost more than a compare too many.
+        // `&`, not `&&`: two loads that wait for each other cost more than one unneeded comparison.
         (self.min[axis] <= other.max[axis]) & (other.min[axis] <= self.max[axis])
     }
 }
@@ -68,7 +68,7 @@ impl Bounds {
 /// The bodies in the broad phase.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Members {
-    /// Whether boxes are copied: not for a method that reads them where they are.
+    /// Whether boxes are copied; not for a method that reads them in place.
     with_bounds: bool,
     bounds: Vec<Bounds>,
     ids: Vec<BodyId>,
@@ -79,9 +79,9 @@ pub(super) struct Members {
     unbounded: Vec<BodySlot>,
     /// Bodies with a flag of this tick, each once.
     touched: Vec<BodySlot>,
-    /// Slots whose id is not above that of the slot before, also of bodies that left.
+    /// Number of slots whose id is not above that of the slot before; bodies that left are included.
     descents: usize,
-    /// How often a slot got another id, or slots came or went.
+    /// How often a slot got another id, or slots were added or removed.
     named: u64,
 }
 
@@ -102,7 +102,7 @@ impl Members {
         give_back(&mut self.touched, self.bounded.len());
     }
 
-    /// Gives the memory of slots behind those of all who are in back, before anybody is touched.
+    /// Gives back the memory of slots beyond the last body that is in; called before any body is touched.
     pub(super) fn give_back(&mut self) {
         let last = self.flags.iter().rposition(|flags| flags & IN != 0);
         let len = last.map_or(0, |last| last + 1);
@@ -117,7 +117,7 @@ impl Members {
         }
     }
 
-    /// Takes a body out; `false` when it is not in.
+    /// Removes a body; `false` when it is not in.
     pub(super) fn leave(&mut self, slot: BodySlot) -> bool {
         if !self.has(slot, IN) {
             return false;
@@ -137,7 +137,7 @@ impl Members {
         true
     }
 
-    /// Takes a body in; `false` when it is in already.
+    /// Adds a body; `false` when it is in already.
     pub(super) fn enter(&mut self, slot: BodySlot, proxies: &impl Proxies) -> bool {
         if self.has(slot, IN) {
             return false;
@@ -174,7 +174,7 @@ impl Members {
         true
     }
 
-    /// Notes that all who are in come in this tick: no structure knows them.
+    /// Marks all bodies that are in as coming in this tick: no structure has them.
     ///
     /// * `with_bounds` - whether boxes are copied from now on.
     pub(super) fn come_anew(&mut self, with_bounds: bool, proxies: &impl Proxies) {
@@ -206,17 +206,17 @@ impl Members {
         self.descents += descents(&self.ids[around]);
     }
 
-    /// Whether ids ascend with slots: keys then are in the order of ids as they are.
+    /// Returns whether ids ascend with slots: then keys sort in the order of ids as they are.
     pub(super) fn ids_ascend(&self) -> bool {
         self.descents == 0
     }
 
-    /// Ids by slot, also of bodies that left.
+    /// Ids by slot; bodies that left are included.
     pub(super) fn ids(&self) -> &[BodyId] {
         &self.ids
     }
 
-    /// Another number whenever [`Members::ids`] are others; never 0 where there are any.
+    /// Changes whenever [`Members::ids`] change; never 0 when there are any.
     pub(super) fn named(&self) -> u64 {
         self.named
     }
@@ -240,7 +240,7 @@ impl Members {
         *all |= flags;
     }
 
-    /// Whether any of these flags is set.
+    /// Returns whether any of these flags is set.
     #[inline]
     pub(super) fn has(&self, slot: BodySlot, flags: u8) -> bool {
         self.flags
@@ -248,7 +248,7 @@ impl Members {
             .is_some_and(|all| all & flags != 0)
     }
 
-    /// Whether it is in and has a box.
+    /// Returns whether the body is in and has a box.
     #[inline]
     pub(super) fn is_bounded(&self, slot: BodySlot) -> bool {
         self.flags
@@ -272,7 +272,7 @@ impl Members {
         &self.flags
     }
 
-    /// Bodies with a box, in no order that means anything.
+    /// Bodies with a box, in arbitrary order.
     pub(super) fn bounded(&self) -> &[BodySlot] {
         &self.bounded
     }
@@ -282,12 +282,12 @@ impl Members {
         &self.unbounded
     }
 
-    /// Bodies that this tick touched, each once.
+    /// Bodies touched in this tick, without duplicates.
     pub(super) fn touched(&self) -> &[BodySlot] {
         &self.touched
     }
 
-    /// The ids of a pair, the smaller first: the order of every result.
+    /// The ids of a pair, the smaller first: the sort order of every result.
     pub(super) fn rank(&self, key: PairKey) -> (BodyId, BodyId) {
         let (low, high) = key.slots();
         let (a, b) = (self.ids[low.index()], self.ids[high.index()]);
@@ -322,13 +322,13 @@ impl Members {
     }
 }
 
-/// Cuts a list off, and gives the memory of the rest back.
+/// Truncates a list and gives the rest of its memory back.
 fn shorten<T>(list: &mut Vec<T>, len: usize) {
     list.truncate(len);
     list.shrink_to_fit();
 }
 
-/// How many ids are not above the one before.
+/// Number of ids that are not above the one before.
 fn descents(ids: &[BodyId]) -> usize {
     ids.windows(2).filter(|two| two[0] >= two[1]).count()
 }

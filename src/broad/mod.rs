@@ -1,16 +1,16 @@
 //! Broad phase: which pairs of boxes overlap, kept across ticks.
 //!
-//! In: a [`ChangeSet`] (who left, came, moved, must be asked again), the boxes ([`Proxies`]), the filters
+//! In: a [`ChangeSet`] (bodies that left, came, moved or must be queried again), the boxes ([`Proxies`]), the filters
 //! ([`PairPolicy`]). Out: the [`PairSet`], of which this room is the only writer, and a [`PairDelta`].
 //!
-//! Six methods behind one door. [`Method::BruteForce`] looks at every pair: the twin, for ever. [`Method::Order`] keeps
-//! blocks of fat boxes and their candidates (see `order`). [`Method::SweepAndPrune`] keeps sorted lists of box ends
-//! (see `sap`). [`Method::UniformGrid`], [`Method::SpatialHash`] and [`Method::HierarchicalGrid`] keep bodies in cells
-//! (see `grid`). A method only tells which boxes overlap, or may; what is stored is decided in one place (`commit`), so
-//! all give the same pairs in the same slots, and the same delta.
+//! Six methods behind one interface. [`Method::BruteForce`] tests every pair and stays as the reference for the others.
+//! [`Method::Order`] keeps blocks of fat boxes and their candidates (see `order`). [`Method::SweepAndPrune`] keeps
+//! sorted lists of box ends (see `sap`). [`Method::UniformGrid`], [`Method::SpatialHash`] and
+//! [`Method::HierarchicalGrid`] keep bodies in cells (see `grid`). A method only reports which boxes overlap, or may;
+//! what is stored is decided in one place (`commit`), so all give the same pairs in the same slots, and the same delta.
 //!
-//! The pairs are those of the f64 boxes, at any offset: what rounds boxes to f32 asks the f64 boxes where rounding
-//! could tell otherwise.
+//! The pairs are those of the f64 boxes, at any offset: a method that rounds boxes to f32 tests the f64 boxes wherever
+//! rounding could change the answer.
 
 use crate::ids::{BodyId, BodySlot, PairKey};
 use crate::math::Aabb;
@@ -43,54 +43,54 @@ use short::Short;
 
 /// The boxes, as the world has them.
 pub trait Proxies {
-    /// Box of a body, world frame, metres; each end finite or infinite, never NaN. Not asked of unbounded bodies.
+    /// Box of a body, world frame, metres; each end finite or infinite, never NaN. Not called for unbounded bodies.
     fn aabb(&self, slot: BodySlot) -> &Aabb;
-    /// Whether the body has no box (a half-space). Fixed while it is in the broad phase.
+    /// Returns whether the body has no box (a half-space). Fixed while it is in the broad phase.
     fn unbounded(&self, slot: BodySlot) -> bool;
-    /// Its id: the order of results.
+    /// Id of a body; results are ordered by it.
     fn id(&self, slot: BodySlot) -> BodyId;
 }
 
-/// What the last update did; all counted, nothing timed.
+/// What the last update did. All values are counts; nothing is timed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Ends of boxes that passed one another.
+    /// Box ends that passed one another.
     pub swaps: u64,
     /// Boxes compared with one another.
     pub tests: u64,
-    /// Pairs that were told to begin, or may: those that were stored before, and some twice, among them.
+    /// Pairs reported as beginning, or that may begin; includes pairs already stored, and some duplicates.
     pub told: u64,
-    /// Times the lists were sorted anew instead of repaired.
+    /// Times the lists were sorted from scratch instead of repaired.
     pub rebuilds: u64,
-    /// Pairs of boxes that overlap on the sorted axes but were not asked on the one left out.
+    /// Pairs of boxes that overlap on the sorted axes; the axis left out was not tested.
     pub partial: u64,
     /// Axes kept sorted: x, y, z.
     pub axes: [bool; 3],
     /// Bodies that got a new fat box.
     pub renewed: u64,
-    /// Cells that bodies were put in.
+    /// Cells that bodies were put into.
     pub cells: u64,
-    /// Which way of working was chosen, and why; `None`: the method has one way.
+    /// Mode that was chosen, and why; `None`: the method has only one.
     pub way: Option<(BroadMode, BroadCause)>,
 }
 
-/// So far must the number of bodies fall for their memory to be given back: to show those that are left to a new method
-/// takes less than a tick of all did.
+/// Memory is given back when the number of bodies has fallen by this factor: showing the rest to a fresh structure then
+/// costs less than one tick with all of them did.
 const FALLEN: usize = 16;
 
 /// The broad phase.
 #[derive(Clone, Debug)]
 pub struct BroadPhase {
     engine: Engine,
-    /// The method has not seen the bodies that are in.
+    /// The method has not yet seen the bodies that are in.
     is_new: bool,
     members: Members,
     forced: Forced,
     found: Found,
     short: Short,
-    /// Most bodies there were since memory was given back.
+    /// Highest number of bodies since memory was last given back.
     most: usize,
-    /// Pairs that the last update found, and how long that has been few.
+    /// Pairs that the last update found; `spare` counts how long that has been few.
     used: usize,
     spare: Spare,
     /// By body: cause of its removal in this update.
@@ -124,42 +124,42 @@ impl BroadPhase {
         }
     }
 
-    /// Goes on with another method, with settings as those of a new one: the next update shows it all bodies as if they
-    /// had come. Pairs go on, and what has begun or ended by then is told as ever.
+    /// Switches to another method, with the settings of a new one: the next update shows it all bodies as if they had
+    /// just come. Stored pairs continue, and pairs that begin or end by then are reported as usual.
     pub fn change_to(&mut self, method: Method) {
         self.engine = Engine::new(method);
         self.is_new = true;
     }
 
-    /// Sets which vector instructions the order uses; all give the same bits. Without it: the best there are.
+    /// Sets which vector instructions `Order` uses; all give the same bits. Default: the best available.
     pub fn use_level(&mut self, level: Level) {
         if let Engine::Order(order) = &mut self.engine {
             order.use_level(level);
         }
     }
 
-    /// Sets whether the order works every tick without candidates, or none; else as counted work says. All give the
-    /// same pairs and events.
+    /// Forces `Order` to work every tick without candidates (`true`) or with them (`false`); by default counted work
+    /// decides. Both give the same pairs and events.
     pub fn use_afresh(&mut self, afresh: bool) {
         if let Engine::Order(order) = &mut self.engine {
             order.use_afresh(Some(afresh));
         }
     }
 
-    /// Sets how many threads the order may use, the caller's own with them, where a tick has enough to compare; one
-    /// without it. Any number gives the same pairs, in the same order.
+    /// Sets how many threads `Order` may use, including the caller's, in ticks with enough comparisons; default: one.
+    /// Any number gives the same pairs, in the same order.
     ///
-    /// * `least` - comparisons of a tick from which on others are asked; 36,000 take about half a millisecond.
+    /// * `least` - comparisons in a tick from which other threads are used; 36,000 take about half a millisecond.
     pub fn use_threads(&mut self, most: usize, least: u64) {
         if let Engine::Order(order) = &mut self.engine {
             order.use_threads(most, least);
         }
     }
 
-    /// Sets how many pairs, stored and missing, are counted anew in each tick in which the set is too small for all;
-    /// 65,536 without it. More are after so many ticks as they are times that, if anything of theirs changed; or once
-    /// an eighth of the set is free. Until then who missed a pair stays truncated, and new pairs of two such bodies are
-    /// missed.
+    /// Sets how many pairs, stored and missing, are recounted in each tick while the set is too small for all; default
+    /// 65,536. If there are k times as many, they are recounted every k ticks if anything about them changed, or once
+    /// an eighth of the set is free. Until then a body that missed a pair stays truncated, and new pairs of two such
+    /// bodies are missed.
     pub fn use_recount(&mut self, most: u64) {
         self.short.use_most(most);
     }
@@ -170,7 +170,7 @@ impl BroadPhase {
         self.members.bounded().len() + self.members.unbounded().len()
     }
 
-    /// Whether there is no body.
+    /// Returns whether there is no body.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -182,10 +182,10 @@ impl BroadPhase {
         self.work
     }
 
-    /// Replaces the pairs that are candidates whatever the boxes say, while both bodies are in; applied by the next
-    /// update. A pair that is no longer forced and does not overlap ends as `Separated`.
+    /// Replaces the pairs that are candidates whatever the boxes say, while both bodies are in; the next update applies
+    /// it. A pair that is no longer forced and does not overlap ends as `Separated`.
     ///
-    /// * `keys` - the whole list, in any order. To be given again when a rule changes or a slot changes hands.
+    /// * `keys` - the whole list, in any order. Pass it again when a rule changes or a slot gets another body.
     pub fn force(&mut self, keys: &[PairKey]) {
         self.forced.replace(keys);
         self.short.stir();
@@ -193,10 +193,10 @@ impl BroadPhase {
 
     /// Brings the pair set up to date with one tick's changes.
     ///
-    /// Order: bodies that left (their pairs end with the cause given), bodies that came, boxes that moved, bodies to
-    /// ask again (`requery`: their pairs end as `Filtered` or `Separated`, or begin). A stored pair ends as
+    /// Order: bodies that left (their pairs end with the given cause), bodies that came, boxes that moved, bodies to
+    /// query again (`requery`: their pairs end as `Filtered` or `Separated`, or begin). A stored pair ends as
     /// `Separated` when the boxes part, unless it is forced, a body is unbounded, or the policy keeps one of the two.
-    /// Slots in the lists that do not fit (a move of a body that is not in) are passed over.
+    /// Slots in the lists that do not fit (a move of a body that is not in) are skipped.
     pub fn update(
         &mut self,
         changes: &ChangeSet,
@@ -221,7 +221,7 @@ impl BroadPhase {
         if !is_brute {
             let judge = Judge::of(&self.members, &self.forced, proxies, policy);
             touched::end(&judge, pairs, &mut self.found);
-            // Whoever came has the new box already.
+            // Bodies that came have their new box already.
             let moved = if self.is_new { &[][..] } else { &changes.moved };
             self.search(moved, proxies);
         }
@@ -243,7 +243,7 @@ impl BroadPhase {
         give_back(&mut self.parted, bodies);
     }
 
-    /// Of very many bodies, or pairs that came and went, few are left: gives the memory of the others back.
+    /// Gives memory back when few bodies, or few pairs that come and go, are left of very many.
     fn give_back(&mut self, pairs: &mut PairSet, delta: &mut PairDelta) {
         let bodies = self.len();
         self.most = self.most.max(bodies);
@@ -268,7 +268,7 @@ impl BroadPhase {
         *delta = PairDelta::default();
     }
 
-    /// Lets the method find what has begun, or may have, and what has parted.
+    /// Lets the method find pairs that began, or may have, and pairs that parted.
     fn search(&mut self, moved: &[BodySlot], proxies: &impl Proxies) {
         match &mut self.engine {
             Engine::Brute => {}
@@ -289,8 +289,8 @@ impl BroadPhase {
         }
     }
 
-    /// Takes out the bodies that left; their pairs end. Of two bodies that left, the cause with the lower code wins,
-    /// so that no order of slots shows.
+    /// Removes the bodies that left; their pairs end. If both bodies of a pair left, the lower cause code wins, so that
+    /// the result does not depend on the order of slots.
     fn leave(&mut self, changes: &ChangeSet, pairs: &mut PairSet) {
         self.left.clear();
         for removed in &changes.removed {
@@ -307,7 +307,7 @@ impl BroadPhase {
         pairs.list(changes.removed.len());
         let mut doomed = std::mem::take(&mut self.found.doomed);
         for removed in &changes.removed {
-            // All of a body at once: without lists each question is a look at every pair.
+            // All pairs of a body at once: without lists each lookup scans every pair.
             doomed.extend(pairs.partners(removed.slot).map(|(slot, other)| {
                 let theirs = self.causes.get(other.index()).copied();
                 let theirs = theirs.filter(|cause| *cause != EndCause::None);
@@ -332,16 +332,16 @@ impl BroadPhase {
         }
     }
 
-    /// Takes in the bodies that came.
+    /// Adds the bodies that came.
     fn enter(&mut self, changes: &ChangeSet, proxies: &impl Proxies) {
         for slot in &changes.inserted {
             self.members.enter(*slot, proxies);
         }
     }
 
-    /// Takes the new boxes and notes whom to ask again.
+    /// Takes the new boxes and marks the bodies to query again.
     fn mark(&mut self, changes: &ChangeSet, proxies: &impl Proxies, pairs: &PairSet) {
-        // The order keeps the difference itself: it reads the list of the moved and marks nobody.
+        // `Order` finds differences itself: it reads the list of moved bodies and needs no marks.
         if self.is_new || !matches!(self.engine, Engine::Order(_)) {
             for slot in &changes.moved {
                 self.members.moved(*slot, proxies);
@@ -358,7 +358,7 @@ impl BroadPhase {
     /// Checks the whole structure, the boxes against the caller's, and each stored pair against filters and boxes.
     ///
     /// # Errors
-    /// One sentence on the first thing that does not hold.
+    /// One sentence on the first check that fails.
     pub fn validate(
         &self,
         proxies: &impl Proxies,

@@ -1,4 +1,4 @@
-//! The world as the broad phase sees it: its boxes and its filters.
+//! The world as input of the broad phase: its boxes and its filters.
 
 use super::Proxies;
 use crate::ids::{BodyId, BodySlot};

@@ -1,36 +1,36 @@
-//! A pair set that is too small: when the pairs that found no room are looked for again.
+//! A pair set that is too small: when to search again for the pairs that did not fit.
 //!
-//! In: how full the set is. Out: whether the bodies that miss pairs are asked for all of theirs in this tick. That
-//! tells every overlap of a crowd, which may be many times what the set holds. So it is done in each tick only where
-//! pairs are few; else at times, and only when something of them may have changed: a crowd at rest costs nothing.
+//! In: how full the set is. Out: whether the bodies that miss pairs are queried for all of theirs in this tick. Such a
+//! query reports every overlap of a crowd, possibly many times what the set holds. So it runs in each tick only where
+//! pairs are few; otherwise now and then, and only when the result may have changed: a crowd at rest costs nothing.
 //!
-//! In the ticks between nothing is lost: whoever missed a pair stays marked, and so is what is said of it. A pair of
-//! two marked bodies waits, for it may be one that was missed before; any other is new, and is stored or missed as
-//! ever.
+//! Nothing is lost in the ticks between: a body that missed a pair stays marked and is still reported as truncated. A
+//! pair of two marked bodies waits, for it may be one that was missed before; any other pair is new, and is stored or
+//! counted as missing as usual.
 //!
-//! What decides is counted and the same for every method, so that all store alike, and so does a replay.
+//! The decision depends on counts only, which are the same for every method, so all methods and a replay store alike.
 
 use super::BroadPhase;
 use super::members::{ASKED, IN};
 use crate::pairs::PairSet;
 use crate::world::ChangeSet;
 
-/// Pairs, stored and missing, that may be counted anew in each tick: some 2 ms.
+/// Pairs, stored and missing, that may be recounted in each tick: about 2 ms.
 const PAIRS: u64 = 1 << 16;
-/// So much of a full set is left, and what is missing is looked for at once: the crowd goes apart.
+/// When one part in `ROOMY` of the set is free, missing pairs are searched at once: the crowd is dispersing.
 const ROOMY: usize = 8;
 
-/// When what is missing was counted.
+/// When the missing pairs were last counted.
 #[derive(Clone, Debug)]
 pub(super) struct Short {
-    /// Pairs that may be counted anew in each tick.
+    /// Pairs that may be recounted in each tick.
     most: u64,
-    /// Pairs that were stored and missing when they were last counted; and ticks since.
+    /// Pairs stored and missing at the last count; and ticks since.
     pairs: u64,
     ticks: u64,
-    /// What is missing may have become less since.
+    /// The number of missing pairs may have fallen since.
     stirred: bool,
-    /// Pairs are missing, and are not counted in this tick.
+    /// Pairs are missing and are not counted in this tick.
     waits: bool,
 }
 
@@ -47,17 +47,17 @@ impl Default for Short {
 }
 
 impl Short {
-    /// Sets how many pairs may be counted anew in each tick.
+    /// Sets how many pairs may be recounted in each tick.
     pub(super) fn use_most(&mut self, most: u64) {
         self.most = most;
     }
 
-    /// A body that misses pairs moved, left or was edited, or the pairs of rules are others.
+    /// A body that misses pairs moved, left or was edited, or the forced pairs changed.
     pub(super) fn stir(&mut self) {
         self.stirred = true;
     }
 
-    /// Begins a tick; returns whether all pairs of the bodies that miss some are to be looked for.
+    /// Begins a tick; returns whether to search all pairs of the bodies that miss some.
     ///
     /// * `misses` - whether a body that is in misses pairs.
     fn open_tick(&mut self, misses: bool, pairs: &PairSet) -> bool {
@@ -71,7 +71,7 @@ impl Short {
         misses && !self.waits
     }
 
-    /// Whether pairs are missing that are not counted in this tick.
+    /// Returns whether pairs are missing that are not counted in this tick.
     pub(super) fn waits(&self) -> bool {
         self.waits
     }
@@ -87,8 +87,8 @@ impl Short {
 }
 
 impl BroadPhase {
-    /// Notes whom to ask again of those that miss pairs, so that these are counted exactly, and stored when there is
-    /// room; once those that left are out, and their pairs.
+    /// Marks the bodies that miss pairs for a new query, so that missing pairs are counted exactly, and stored when
+    /// there is room. Called after bodies that left were removed with their pairs.
     pub(super) fn ask_missing(&mut self, changes: &ChangeSet, pairs: &PairSet) {
         let members = &mut self.members;
         if !(pairs.truncated().iter()).any(|slot| members.has(*slot, IN)) {

@@ -1,5 +1,5 @@
-//! What a change of a body tells without any list: which of its stored pairs end, and which pairs of rules and of
-//! unbounded bodies it gets. Used by every method that looks only at what changed.
+//! What a change of a body implies without any list: which of its stored pairs end, and which forced pairs and pairs
+//! with unbounded bodies it gets. Used by every method that tests only what changed.
 
 use super::Proxies;
 use super::commit::{Found, Judge};
@@ -7,7 +7,7 @@ use super::members::{ASKED, IN, MOVED, REFILTERED, UNBOUNDED};
 use crate::ids::{BodySlot, PairKey};
 use crate::pairs::{PairPolicy, PairSet};
 
-/// Ends the pairs of moved and asked bodies whose boxes parted or whose filters changed.
+/// Ends the pairs of moved and queried bodies whose boxes parted or whose filters changed.
 ///
 /// Cost: the stored pairs of those bodies.
 pub(super) fn end(
@@ -22,7 +22,7 @@ pub(super) fn end(
     for slot in members.touched().iter().filter(|slot| looks(slot)) {
         let mine = members.has(*slot, REFILTERED);
         for (pair, other) in pairs.partners(*slot) {
-            // Of two such bodies the lower looks.
+            // If both bodies are to be tested, the one with the lower slot does it.
             if other < *slot && looks(&other) {
                 continue;
             }
@@ -42,7 +42,7 @@ pub(super) fn end(
     found.doomed = doomed;
 }
 
-/// Suggests the pairs that no box decides: forced ones and those of unbounded bodies.
+/// Suggests the pairs that do not depend on boxes: forced ones and those of unbounded bodies.
 pub(super) fn begin(judge: &Judge<'_, impl Proxies, impl PairPolicy>, found: &mut Found) {
     let members = judge.members;
     found.maybe.extend_from_slice(judge.forced.changed());

@@ -1,8 +1,8 @@
-//! The workers that turn requests into edits with built shapes, and answer questions, off the tick's thread: a mesh of
-//! a million triangles takes seconds to build, and neither a tick nor a question waits for it.
+//! The workers that turn requests into edits with built shapes, and answer queries, outside the tick's thread: a mesh
+//! of a million triangles takes seconds to build, and neither a tick nor a query waits for it.
 //!
-//! In: requests in their order, questions with their bodies, worn trees. Out: edits in the order of their requests,
-//! answers as they are found.
+//! In: requests in order, queries with their bodies, worn trees. Out: edits in the order of their requests, answers as
+//! they are found.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -22,41 +22,41 @@ use crate::transport::RequestToken;
 use crate::wire::Answer;
 use crate::world::{BuiltTree, Parts, WornTree};
 
-/// The answer to a request whose building broke down; the panic itself is told on stderr.
+/// The answer to a request whose processing panicked; the panic itself is printed on stderr.
 const INTERNAL: &str =
     "an internal error of the daemon while it read the request: nothing was changed; see its log";
 
-/// A question that brings along more vertices, faces and samples waits among the edits: others do not wait for it.
+/// A query that contains more vertices, faces and samples is queued with the edits, so that others do not wait for it.
 const LARGE: usize = 4096;
 
-/// Stands for the asker of a tree: the daemon itself.
+/// Token for trees, which the daemon itself requests.
 pub(super) const TREE: RequestToken = RequestToken(u64::MAX);
 
-/// For the thread that reads requests and answers questions.
+/// Jobs for the thread that reads requests and answers queries.
 enum Reading {
-    /// A request: its payload, of which so many bytes are JSON.
+    /// A request: the number of JSON bytes, and its payload.
     Request(RequestToken, usize, Vec<u8>),
-    /// A question, with the bodies it is about.
+    /// A query, with its bodies.
     Measure(RequestToken, Box<Query>),
 }
 
-/// For the thread that builds shapes and trees.
+/// Jobs for the thread that builds shapes and trees.
 enum Building {
-    /// Edits that were read, the payload they were read from, and how much of it is JSON.
+    /// Parsed edits, the number of JSON bytes, and the payload.
     Edits(RequestToken, EditRequest, usize, Vec<u8>),
-    /// A question that brings along large shapes.
+    /// A query that contains large shapes.
     Question(RequestToken, Question),
-    /// A tree that has become loose; nobody waits for an answer.
+    /// A tree that has become loose; no client waits for an answer.
     Tree(Box<WornTree>),
-    /// What is needed no more.
+    /// Data to be dropped.
     Forget(Box<dyn Send>),
 }
 
-/// What became of a request.
+/// Result of a request.
 pub(super) enum Done {
-    /// Edits for the next tick, and what they were made of.
+    /// Edits for the next tick, and the request they were made from.
     Batch(EditBatch, Asked),
-    /// A question, for which the bodies are to be looked up.
+    /// A query whose bodies are to be looked up.
     Ask(Box<Asking>),
     /// A tree to be put in place.
     Tree(Box<BuiltTree>),
@@ -64,21 +64,21 @@ pub(super) enum Done {
     Found(Box<Answer>),
 }
 
-/// A question that has been read.
+/// A parsed query.
 pub(super) struct Asking {
     pub(super) question: Question,
-    /// Those that it brings along.
+    /// Shapes contained in it.
     pub(super) shapes: Option<Parts>,
-    /// What is odd about them.
+    /// Warnings about them.
     pub(super) warnings: Vec<String>,
 }
 
-/// That, or what to change.
+/// A result, or what to change.
 type Made = std::result::Result<Done, String>;
 
 /// The workers' handle.
 pub(super) struct Builder {
-    /// `None` once it is dropped, which ends the threads.
+    /// `None` while it is being dropped, which ends the threads.
     hands: Option<(Sender<Reading>, Sender<Building>)>,
     built: Receiver<(RequestToken, Made)>,
     open: usize,
@@ -87,7 +87,7 @@ pub(super) struct Builder {
 }
 
 impl Builder {
-    /// Starts the workers with the shapes that are built already.
+    /// Starts the workers with the shapes that are already built.
     pub(super) fn start(library: Library, scene: &Scene, clock: Arc<dyn Clock>) -> Result<Self> {
         let (to_read, requests) = channel();
         let (to_build, jobs) = channel();
@@ -119,12 +119,12 @@ impl Builder {
         })
     }
 
-    /// Hands over a request.
+    /// Passes a request to the workers.
     pub(super) fn ask(&mut self, token: RequestToken, json_len: usize, payload: Vec<u8>) {
         self.read(Reading::Request(token, json_len, payload));
     }
 
-    /// Hands over a question.
+    /// Passes a query to the workers.
     pub(super) fn measure(&mut self, token: RequestToken, query: Query) {
         self.read(Reading::Measure(token, Box::new(query)));
     }
@@ -135,13 +135,13 @@ impl Builder {
         self.open += usize::from(sent);
     }
 
-    /// Hands over a tree to be built.
+    /// Passes a tree to be built to the workers.
     pub(super) fn build_tree(&mut self, worn: WornTree) {
         let sent = self.build(Building::Tree(Box::new(worn)));
         self.open += usize::from(sent);
     }
 
-    /// Hands over what is needed no more: to give the memory of a large request back takes as long as a tick.
+    /// Passes data to be dropped to a worker: freeing the memory of a large request takes as long as a tick.
     pub(super) fn forget(&self, what: impl Send + 'static) {
         let _gone_anyway = self.build(Building::Forget(Box::new(what)));
     }
@@ -151,12 +151,12 @@ impl Builder {
         hand.is_some_and(|(_, to_build)| to_build.send(job).is_ok())
     }
 
-    /// Whether a request is being worked on.
+    /// Returns whether a request is being worked on.
     pub(super) fn busy(&self) -> bool {
         self.open > 0
     }
 
-    /// What the workers have finished since.
+    /// The next result that the workers have finished.
     pub(super) fn finished(&mut self) -> Option<(RequestToken, Made)> {
         let built = self.built.try_recv().ok()?;
         self.open = self.open.saturating_sub(1);
@@ -168,7 +168,7 @@ impl Drop for Builder {
     fn drop(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
         self.hands = None;
-        // A shape can take seconds to build, and nobody waits for it any more: busy workers end by themselves.
+        // A shape can take seconds to build, and its result is no longer needed: busy workers end by themselves.
         if self.open == 0 {
             for thread in self.threads.drain(..) {
                 let _ended_anyway = thread.join();
@@ -177,17 +177,17 @@ impl Drop for Builder {
     }
 }
 
-/// Where a worker puts what it has made.
+/// Where a worker puts its results.
 #[derive(Clone)]
 struct Desk {
     answers: Sender<(RequestToken, Made)>,
-    /// What still waits then is not made any more.
+    /// Once set, waiting jobs are not done any more.
     ended: Arc<AtomicBool>,
 }
 
-/// A thread that does its jobs one after another; whatever goes wrong, its asker gets an answer and the next is done.
+/// Starts a thread that does its jobs one by one; if one fails, its client gets an answer and the next job is done.
 ///
-/// * `work` - `None`: there is nothing to say of it, or another worker will.
+/// * `work` - returns `None` if there is no result, or another worker will give it.
 fn start<J: Job>(
     name: &str,
     jobs: Receiver<J>,
@@ -215,9 +215,9 @@ fn start<J: Job>(
         .map_err(|e| Error::io("cannot start a thread that works on requests", e))
 }
 
-/// What a worker does at a time.
+/// A job of a worker.
 trait Job: Send + 'static {
-    /// Who waits for it.
+    /// Token of the request that it belongs to.
     fn token(&self) -> RequestToken;
 }
 
@@ -237,9 +237,9 @@ impl Job for Building {
     }
 }
 
-/// Reads requests; answers questions, and hands edits on in their order.
+/// Reads requests; answers queries, and passes edits on in order.
 struct Reader {
-    /// For what questions bring along.
+    /// For shapes contained in queries.
     shapes: EditBuilder,
     clock: Arc<dyn Clock>,
     to_build: Sender<Building>,
@@ -271,7 +271,7 @@ impl Reader {
             Request::Ask(question) => return asking(&mut self.shapes, question).map(Some),
             Request::Edits(asked) => Building::Edits(token, asked, json_len, payload),
         };
-        // The other one ends with this one alone.
+        // The other worker ends only with this one.
         self.to_build.send(job).map_err(|_| INTERNAL)?;
         Ok(None)
     }
@@ -282,7 +282,7 @@ fn is_large(question: &Question) -> bool {
     sizes.fold(0, usize::saturating_add) > LARGE
 }
 
-/// Builds what a question brings along.
+/// Builds the shapes contained in a query.
 fn asking(builder: &mut EditBuilder, question: Question) -> Made {
     let built = match question.shapes() {
         [] => None,
@@ -296,7 +296,7 @@ fn asking(builder: &mut EditBuilder, question: Question) -> Made {
     })))
 }
 
-/// Makes edits, trees, and what is large in questions.
+/// Builds edits, trees, and large shapes of queries.
 struct Maker {
     edits: EditBuilder,
 }

@@ -1,6 +1,6 @@
 //! The daemon: one thread owns the ports and runs the engine; shapes of scene edits are built on another.
 //!
-//! In: a scene, a [`Door`], a stop flag. Out: ticks, until told to stop.
+//! In: a scene, a [`Door`], a stop flag. Out: ticks, until it is stopped.
 
 mod builder;
 mod notes;
@@ -35,12 +35,12 @@ pub use crate::tick::build::{Shapes, build_shapes};
 pub use notes::body_note;
 pub use watchdog::Watchdog;
 
-/// While a worker builds shapes the loop looks this often whether they are ready, nanoseconds.
+/// While a worker builds shapes the loop checks this often whether they are ready, nanoseconds.
 const BUILD_LOOK_NS: u64 = 2_000_000;
-/// Longest wait, nanoseconds: a signal that comes between the look at the stop flag and the wait is seen then.
+/// Longest wait, nanoseconds: a signal between the check of the stop flag and the wait is noticed after it.
 const WAIT_MAX_NS: u64 = 100_000_000;
 
-/// Between two looks whether somebody has sent something while a tick's budget is used up, nanoseconds.
+/// Time between two checks for new messages while a tick's budget is used up, nanoseconds.
 const REST_SLICE_NS: u64 = 250_000;
 
 /// A running daemon.
@@ -54,15 +54,15 @@ pub struct Daemon<'a> {
     arrived: Inbox,
     due: Inbox,
     ready: Vec<EditBatch>,
-    /// Questions for which the bodies are to be looked up, once no tick is due.
+    /// Queries whose bodies are to be looked up when no tick is due.
     asking: VecDeque<(RequestToken, Box<Asking>)>,
-    /// A tick is wanted at once.
+    /// A tick was requested at once.
     tick_asked: bool,
-    /// The tree that the worker builds.
+    /// The tree that the worker is building.
     tree_asked: Option<TreeOf>,
     /// Raised each round, and each heartbeat of a long tick.
     progress: Arc<AtomicU64>,
-    /// Who writes down what the engine is given and says.
+    /// Records the engine's input and output.
     recorder: Option<Recorder>,
     unsent: Seldom,
     refusals: Refusals,
@@ -110,7 +110,7 @@ impl<'a> Daemon<'a> {
         Ok(daemon)
     }
 
-    /// Raises this counter from now on, each round and each heartbeat of a long tick.
+    /// From now on raises this watchdog's counter each round and each heartbeat of a long tick.
     pub fn watched_by(&mut self, watchdog: &Watchdog) {
         self.progress = watchdog.progress();
     }
@@ -132,8 +132,8 @@ impl<'a> Daemon<'a> {
         Ok(())
     }
 
-    /// Uses what the last tick's budget left, until there is something else to do or `stop` is raised; whether there
-    /// is.
+    /// Uses the rest of the last tick's budget until there is something else to do or `stop` is raised; returns whether
+    /// there is.
     fn work_on(&mut self, stop: &AtomicBool) -> Result<bool> {
         let mut news = false;
         while !news && self.wait_ns() > 0 && self.engine.work_on(REST_SLICE_NS) {
@@ -143,10 +143,10 @@ impl<'a> Daemon<'a> {
         Ok(news)
     }
 
-    /// Takes what has come and runs the tick that is due, if one is; whether `ticks` have been run.
+    /// Takes new messages and runs the tick that is due, if any; returns whether `ticks` have been run.
     ///
-    /// One tick a round: where ticks are always due (a rate beyond what the machine can do) frames, requests and the
-    /// stop flag are still looked at between any two.
+    /// One tick per round: if ticks are always due (a rate that the machine cannot keep) frames, requests and the stop
+    /// flag are still checked between any two.
     ///
     /// # Errors
     /// As [`Daemon::run`].
@@ -165,7 +165,7 @@ impl<'a> Daemon<'a> {
         Ok(ticks.is_some_and(|most| self.engine.ticks() >= most))
     }
 
-    /// The engine, for a look at its state.
+    /// The engine, for read access to its state.
     #[must_use]
     pub fn engine(&self) -> &Engine {
         &self.engine
@@ -186,7 +186,7 @@ impl<'a> Daemon<'a> {
         }
     }
 
-    /// Takes frames and requests; requests go to the worker, built edits come back from it.
+    /// Takes frames and requests; passes requests to the worker and takes built edits from it.
     fn receive(&mut self) -> Result<()> {
         self.door.receive(&mut self.arrived, self.clock.as_ref());
         let now_ns = self.clock.boottime_ns();
@@ -215,7 +215,7 @@ impl<'a> Daemon<'a> {
         Ok(())
     }
 
-    /// Takes the tree that the worker has built, or tells once that it could not.
+    /// Takes the tree that the worker has built, or logs once that it could not.
     fn settle_tree(&mut self, built: std::result::Result<Done, String>) {
         let asked = self.tree_asked.take();
         if let Ok(Done::Tree(tree)) = built {
@@ -234,8 +234,8 @@ impl<'a> Daemon<'a> {
         }
     }
 
-    /// Whether these edits, or the end of another's wait, are what a frame of the leading source waits for, whose tick
-    /// theirs is, too; or one that moves a continuous body, whose way no later tick asks for.
+    /// Returns whether these edits, or the end of another wait, release a waiting frame of the leading source, so that
+    /// this tick is that frame's tick too; or a frame that moves a continuous body, whose motion no later tick sweeps.
     ///
     /// * `now_ns` - time of the tick, nanoseconds of `CLOCK_BOOTTIME`.
     fn takes_a_frame_that_waited(&self, now_ns: u64) -> bool {
@@ -248,7 +248,7 @@ impl<'a> Daemon<'a> {
         sources.any(|(at, s)| (s.name == *lead || world.is_followed(at)) && takes(s))
     }
 
-    /// Runs one tick and sends what it filled.
+    /// Runs one tick and sends its results.
     fn tick(&mut self, due: Due, woke_ns: u64) -> Result<()> {
         self.tell_passed();
         let taken = self.taken_of_lead();

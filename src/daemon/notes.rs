@@ -5,7 +5,7 @@ use crate::scene::BodySpec;
 use crate::transport::BodyNote;
 use crate::world::PlacedShape;
 
-/// What doors need to know of a body.
+/// What doors need to know about a body.
 #[must_use]
 pub fn body_note(spec: &BodySpec, id: BodyId, placed: &[PlacedShape]) -> BodyNote {
     BodyNote {
@@ -19,7 +19,7 @@ pub fn body_note(spec: &BodySpec, id: BodyId, placed: &[PlacedShape]) -> BodyNot
     }
 }
 
-/// Centre and half extents of a body's box in its own frame; `None`: it has no end.
+/// Centre and half extents of a body's box in its own frame; `None`: it is infinite.
 fn bounds(placed: &[PlacedShape]) -> Option<([f64; 3], [f64; 3])> {
     let boxes = placed.iter().map(|p| p.shape.aabb_at(&p.pose));
     let whole = boxes.reduce(|a, b| a.merged(&b))?;

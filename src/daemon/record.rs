@@ -1,4 +1,4 @@
-//! What the daemon tells its recorder beside the ticks.
+//! What the daemon records in addition to the ticks.
 
 use super::{Daemon, Watchdog};
 use crate::error::Result;
@@ -6,14 +6,14 @@ use crate::record::{Between, Origin, Recorder};
 use crate::tick::EditBatch;
 
 impl Daemon<'_> {
-    /// Records everything from now on; to be called before the first tick.
+    /// Records everything from now on; must be called before the first tick.
     pub fn record(&mut self, recorder: Recorder) {
         self.recorder = Some(recorder);
     }
 
-    /// Ends the recording, where there is one, after the last tick.
+    /// Ends the recording, if there is one, after the last tick.
     ///
-    /// * `watchdog` - ends first: nothing ticks any more, and a slow disk may take its time for what waits.
+    /// * `watchdog` - ended first: there are no more ticks, and a slow disk may need time for the rest.
     ///
     /// # Errors
     /// As [`Recorder::finish`].
@@ -28,7 +28,7 @@ impl Daemon<'_> {
         }
     }
 
-    /// An edit of the next tick, and what it was made of.
+    /// Adds an edit for the next tick, with its origin.
     pub(super) fn edit(&mut self, batch: EditBatch, origin: Origin) {
         self.ready.push(batch);
         let unused = match &mut self.recorder {

@@ -1,11 +1,11 @@
-//! Refusals in the log: a client that only sends hears of none. In: the world after a tick. Out: a line when refusals
-//! begin, and then seldom while they go on.
+//! Logs refusals: a client that only sends is not informed of any. In: the world after a tick. Out: a line when
+//! refusals begin, and then rarely while they go on.
 
 use crate::time::Seldom;
 use crate::wire::{REJECTS_LEN, RejectReason};
 use crate::world::World;
 
-/// What was told.
+/// What was logged.
 #[derive(Debug, Default)]
 pub(super) struct Refusals {
     seen: u64,
@@ -14,7 +14,7 @@ pub(super) struct Refusals {
 }
 
 impl Refusals {
-    /// What is to be told of now, if anything: how often since the last line, why, of which source, what to change.
+    /// The text to log now, if any: the number since the last line, why, which source, what to change.
     ///
     /// * `now_ns` - nanoseconds, always of the same clock.
     pub(super) fn words(&mut self, world: &World, now_ns: u64) -> Option<String> {
@@ -53,7 +53,7 @@ mod tests {
     use crate::wire::{Frame, FrameHeader, TransformRow, WIRE_VERSION, frame_flags, name_bytes};
     const S: u64 = 1_000_000_000;
 
-    /// Of one body, at `x` metres.
+    /// A frame with one body, at `x` metres.
     fn frame(source: &str, seq: u64, body: u64, x: f64) -> Frame {
         let header = FrameHeader {
             source: name_bytes(source),

@@ -1,7 +1,6 @@
-//! What becomes of requests on the tick's thread: edits wait for the next tick, questions for the moment after one.
+//! Requests on the tick's thread: edits wait for the next tick, queries until after one.
 //!
-//! In: what the worker made of requests, what ticks made of edits. Out: answers, edits, questions with the bodies that
-//! they are about.
+//! In: results of the worker, outcomes of edits. Out: answers, edits, queries with their bodies.
 
 use super::builder::Done;
 use super::{Daemon, body_note};
@@ -12,7 +11,7 @@ use crate::wire::Answer;
 use crate::world::{Edit, Put};
 
 impl Daemon<'_> {
-    /// Takes what the worker made of a request; its answer, where there is one already.
+    /// Takes a result of the worker; returns its answer, if there is one already.
     pub(super) fn take_built(
         &mut self,
         token: RequestToken,
@@ -22,16 +21,17 @@ impl Daemon<'_> {
             Ok(Done::Batch(batch, asked)) => self.edit(batch, Origin::Asked(asked)),
             Ok(Done::Found(answer)) => return Some(*answer),
             Ok(Done::Ask(asking)) => self.asking.push_back((token, asking)),
-            // Its asker is the daemon.
+            // It was requested by the daemon itself.
             Ok(Done::Tree(_)) => {}
             Err(why) => return Some(refusal(why)),
         }
         None
     }
 
-    /// Looks up the bodies of the oldest question, as the last tick left them, for the worker.
+    /// Looks up the bodies of the oldest query, in the state after the last tick, for the worker.
     ///
-    /// One a round, and behind the tick that is due: a pass over the boxes of a million bodies takes as long as a tick.
+    /// One per round, and after the tick that is due: a pass over the boxes of a million bodies takes as long as a
+    /// tick.
     pub(super) fn take_question(&mut self) {
         let Some((token, asking)) = self.asking.pop_front() else {
             return;
@@ -76,16 +76,16 @@ impl Daemon<'_> {
         }
     }
 
-    /// Tells the doors what the edits of the last tick did to bodies.
+    /// Reports to the doors what the edits of the last tick did to bodies.
     fn tell_bodies(&mut self) {
         let world = self.engine.world();
         let done = self.ready.iter().zip(self.engine.outcomes());
-        // A put of what is there makes no subscription anew.
+        // A put without a change must not renew a subscription.
         let edits =
             done.filter(|(_, outcome)| outcome.result.as_ref().is_ok_and(|done| done.changed));
         let change = |edit: &Edit| match edit {
             Edit::Put(Put { body, shapes }) => {
-                // A later edit of the same request may have taken it out again: then that edit speaks for it.
+                // A later edit of the same request may have removed it again: then only that edit is reported.
                 let placed = world.body(world.slot_named(&body.name)?)?;
                 Some(BodyChange::Put(body_note(body, placed.id, shapes)))
             }
@@ -100,7 +100,7 @@ impl Daemon<'_> {
         }
     }
 
-    /// An answer that cannot be handed over is its asker's loss; the other clients' daemon goes on.
+    /// If an answer cannot be delivered only its client is affected; the daemon continues.
     pub(super) fn answer(&mut self, token: RequestToken, answer: &Answer) {
         let json = serde_json::to_string(answer).unwrap_or_default();
         if let Err(error) = self.door.answer(token, answer.ok, &json) {
@@ -133,7 +133,7 @@ mod tests {
 
     const SECOND_NS: u64 = 1_000_000_000;
 
-    /// A door over memory that notes what it is told of bodies.
+    /// A door over memory that records the reported changes of bodies.
     struct Told(MemoryServer, Vec<BodyChange>);
 
     impl Door for Told {

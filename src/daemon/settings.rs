@@ -1,4 +1,4 @@
-//! What an operator set while the daemon runs, applied between two ticks.
+//! Settings that an operator changed while the daemon runs, applied between two ticks.
 
 use crate::record::{Between, Origin};
 use crate::tick::EditBatch;
@@ -7,11 +7,11 @@ use crate::world::Edit;
 
 use super::Daemon;
 
-/// Token of edits that nobody waits for; doors forget answers to tokens they do not know.
+/// Token of edits without a client; doors ignore answers to unknown tokens.
 const NOBODY: u64 = u64::MAX;
 
 impl Daemon<'_> {
-    /// Takes what was set since the last round.
+    /// Applies settings changed since the last round.
     pub(super) fn apply_settings(&mut self) {
         let mut all = Vec::new();
         self.door.settings(&mut |setting| all.push(setting));
@@ -51,7 +51,7 @@ impl Daemon<'_> {
     }
 }
 
-/// An edit of the daemon's own.
+/// A batch with one edit of the daemon's own.
 fn own(edit: Edit) -> EditBatch {
     EditBatch {
         token: NOBODY,
@@ -82,7 +82,7 @@ mod tests {
     struct Panel {
         settings: Vec<Setting>,
         ticks: Vec<TickRow>,
-        /// Plans that were told.
+        /// Plans that were published.
         plans: Vec<String>,
     }
 
@@ -114,7 +114,7 @@ mod tests {
         fn housekeeping(&mut self) {}
     }
 
-    /// One setting, then rounds over 100 ms of time; the ticks that came of it.
+    /// Applies settings, then runs rounds over 100 ms; returns the resulting ticks.
     fn after(settings: Vec<Setting>) -> Vec<TickRow> {
         played(settings, SCENE).ticks
     }
@@ -165,7 +165,7 @@ mod tests {
             (SCENE, Some(3_000_000), true),
             (&limited, None, false),
             (&limited, Some(1_000_000), true),
-            // Of ticks that judge ages alone none tells what the frames' ticks may take.
+            // Ticks that only judge ages do not show what the frames' ticks may take.
             (&on_frame, None, true),
         ] {
             let panel = played(vec![Setting::BudgetTime(set), Setting::TickNow], scene);

@@ -1,5 +1,5 @@
-//! Frames that no tick is of: passed over for newer ones, or used up together. In: what the pacer and the world count.
-//! Out: the same to engine and recorder.
+//! Frames without their own tick: skipped for newer ones, or used up together. In: counts of the pacer and the world.
+//! Out: the same, reported to engine and recorder.
 
 use super::Daemon;
 use crate::config::Mode;
@@ -8,15 +8,15 @@ use crate::record::{Between, Recorder};
 use crate::tick::Engine;
 
 impl Daemon<'_> {
-    /// Tells the engine of frames that were passed over.
+    /// Reports skipped frames to the engine.
     pub(super) fn tell_passed(&mut self) {
         let (engine, recorder) = (&mut self.engine, &mut self.recorder);
         self.pacer
             .drain_passed(|source, frames| tell_skipped(engine, recorder, source, frames));
     }
 
-    /// The leading source in lockstep, and how many of its frames were taken; none of one whose frames are each a part
-    /// of a body's way.
+    /// The leading source in lockstep, and how many of its frames were taken; `None` for one whose frames are each part
+    /// of a body's path.
     pub(super) fn taken_of_lead(&self) -> Option<(SourceSlot, u64)> {
         let Mode::OnFrame(lead) = &self.config.mode else {
             return None;
@@ -27,7 +27,7 @@ impl Daemon<'_> {
         (!world.is_followed(slot.index())).then_some((slot, frames))
     }
 
-    /// Tells the engine of frames of the lead that waited together and were taken in one tick: all but the newest.
+    /// Reports frames of the leading source that waited together and were taken in one tick: all except the newest.
     pub(super) fn tell_used_up(&mut self, before: Option<(SourceSlot, u64)>) {
         if let (Some((slot, before)), Some((_, now))) = (before, self.taken_of_lead())
             && now > before + 1

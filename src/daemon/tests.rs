@@ -1,4 +1,4 @@
-//! A tree that the worker cannot build; a recording that a slow disk ends.
+//! A tree that the worker cannot build; a recording on a slow disk that ends.
 
 use std::time::Duration;
 
@@ -41,7 +41,7 @@ fn scene() -> Scene {
     Scene::parse(&text, "cloth.toml", std::path::Path::new("")).unwrap()
 }
 
-/// The cloth, wrung and pulled out.
+/// The cloth, twisted and stretched.
 fn cloth(height: f32, stretch: f32) -> Vec<VertexRow> {
     let rows = (0..=CELLS).flat_map(|i| (0..=CELLS).map(move |j| (place(j), place(i))));
     let bent = rows.map(|(x, y)| VertexRow {
@@ -87,7 +87,7 @@ fn a_tree_that_cannot_be_built_is_told_once_and_asked_for_again_only_with_other_
         assert!(height < 0.4, "never worn");
         frame(&mut daemon, Some(&cloth(height, 3.0)));
     }
-    // As when its next round asks the worker, whose building breaks down.
+    // As in its next round, which asks the worker, whose building fails.
     let fail = |daemon: &mut Daemon<'_>| {
         let worn = daemon.engine.worn_tree().unwrap();
         daemon.tree_asked = Some(worn.of());
@@ -105,7 +105,7 @@ fn a_tree_that_cannot_be_built_is_told_once_and_asked_for_again_only_with_other_
         assert!(daemon.tree_asked.is_none() && daemon.engine.worn_tree().is_none());
         daemon.engine.validate().unwrap();
     }
-    // Other vertices are tried, two updates later if they fail too, and it is told no more.
+    // Other vertices are tried, two updates later if they fail too, and it is not logged again.
     frame(&mut daemon, Some(&cloth(0.21, 3.0)));
     let of = daemon.engine.worn_tree().unwrap().of();
     fail(&mut daemon);
@@ -132,7 +132,7 @@ fn a_tree_that_cannot_be_built_is_told_once_and_asked_for_again_only_with_other_
     daemon.engine.validate().unwrap();
 }
 
-/// Takes each tick when it may, and all when nobody is left to say so.
+/// Accepts each tick when signalled, and all once the sender is gone.
 struct Slow(std::sync::mpsc::Receiver<()>);
 
 impl Sink for Slow {

@@ -1,5 +1,5 @@
 //! The watchdog: ends the process when the tick thread makes no progress. In: a counter that the tick thread raises.
-//! Out: exit code 5, so that whoever started the daemon starts it again; readers learn of it by the missing heartbeat.
+//! Out: exit code 5, so that a supervisor restarts the daemon; readers notice by the missing heartbeat.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use crate::error::{Error, Result};
 
-/// Looks without progress after which the thread is given up. Its own looks are counted, not the time: a machine that
-/// was suspended, or a process that was stopped, wakes up to one look, not to ten.
+/// Number of checks without progress after which the thread counts as stuck. Checks are counted, not time: after a
+/// suspended machine or a stopped process wakes up, there was one check, not ten.
 const LOOKS: u32 = 10;
 
 /// Watches a thread until it is dropped.
@@ -21,7 +21,7 @@ pub struct Watchdog {
 }
 
 impl Watchdog {
-    /// Watches from now on: `stuck` is called once when [`Watchdog::progress`] was not raised for `limit`.
+    /// Starts to watch: `stuck` is called once when [`Watchdog::progress`] was not raised for `limit`.
     ///
     /// # Errors
     /// `Error::Io` when the thread cannot be started.
@@ -65,7 +65,7 @@ impl Drop for Watchdog {
     }
 }
 
-/// Looks at a counter.
+/// Checks of a counter.
 #[derive(Default)]
 struct Looks {
     last: Option<u64>,
@@ -95,7 +95,7 @@ mod tests {
         let mut looks = Looks::default();
         let mut stuck = |progress| looks.is_stuck(progress);
         assert!((0..50).all(|progress| !stuck(progress)));
-        // The first look sees a new value, nine more do not.
+        // The first check sees a new value, nine more do not.
         assert!((0..10).all(|_| !stuck(50)));
         assert!(stuck(50));
     }

@@ -1,16 +1,16 @@
-//! Where what has a key stands: an open table from keys to places, so that a lookup does not walk lists.
+//! Hash index: an open-addressing table from keys to places, so that a lookup does not walk lists.
 //!
-//! In: a hash of the key, and what tells the key at a place. The table holds a place and half of its mixed hash, eight
-//! bytes in all; a key is read from where it stands only where that half fits: mostly once, and then it is the one.
-//! For pairs: a body of a dense scene has tens of them, and there walks through lists took 71 % of a tick of the broad
+//! In: a hash of the key, and a test of the key at a place. The table holds a place and half of its mixed hash, eight
+//! bytes in all; a key is read from its place only if that half matches: mostly once, and then it is the right one.
+//! Needed for pairs: a body of a dense scene has tens of them, and walking lists there took 71 % of a tick of the broad
 //! phase. Fixed hash, never iterated: nothing depends on its order.
 //!
-//! How: eight entries share a bucket, a line of memory, and are compared at once. What finds its bucket full goes to
-//! the next one with room, and its own counts it as away; where none is, a lookup ends in the bucket it began in, and
-//! what is taken out leaves a gap that nothing has to fill. With linear probing one entry at a time the ends of runs,
-//! and what shifts back into a gap, were branches that nobody guesses: a third of the time.
+//! How: eight entries share a bucket, one cache line, and are compared at once. A key whose bucket is full goes to the
+//! next one with room, and its own bucket counts it as away; without such keys a lookup ends in the bucket it began in,
+//! and a removal leaves a gap that need not be filled. Linear probing of single entries had unpredictable branches at
+//! the ends of runs and when shifting entries back into a gap: a third of the time.
 //!
-//! The table is of any size, not only of powers of two, which would be up to twice what is needed: every place of it is
+//! The table may have any size, not only powers of two, which would be up to twice what is needed: every place of it is
 //! touched, whatever it holds.
 
 use crate::ids::small;
@@ -19,7 +19,7 @@ use crate::simd::words::{WORDS, same};
 
 /// No place.
 const NONE: u32 = u32::MAX;
-/// Of so many places of the table so many are taken at most: then one key in some thirty is away.
+/// Load limit: at most `TAKEN` of `OF` places are used; then about one key in thirty is outside its own bucket.
 const OF: usize = 3;
 const TAKEN: usize = 2;
 
@@ -37,13 +37,13 @@ impl Bucket {
         places: [NONE; WORDS],
     };
 
-    /// The lane of the key with this hash; and whether there is one.
+    /// The lane of the key with this hash, if there is one.
     #[inline(always)]
     fn lane_of(&self, mixed: u32, is_it: impl Fn(u32) -> bool) -> Option<usize> {
         let mut lanes = same(&self.mixed, mixed);
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % WORDS;
-            // A lane that was given up keeps its hash.
+            // A freed lane keeps its hash.
             if self.places[lane] != NONE && is_it(self.places[lane]) {
                 return Some(lane);
             }
@@ -64,29 +64,29 @@ impl Bucket {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Index {
     buckets: Vec<Bucket>,
-    /// By bucket: how many keys that belong there stand elsewhere.
+    /// By bucket: number of keys that belong there but are stored elsewhere.
     away: Vec<u32>,
     len: usize,
 }
 
 impl Index {
-    /// Empties it, keeps the memory.
+    /// Clears it, keeps the memory.
     pub(crate) fn clear(&mut self) {
         self.buckets.fill(Bucket::EMPTY);
         self.away.fill(0);
         self.len = 0;
     }
 
-    /// The place of a key.
+    /// Looks up the place of a key.
     ///
-    /// * `is_it` - whether the key at a place that is in the table is the one.
+    /// * `is_it` - whether the key at a place is the wanted one.
     #[inline]
     pub(crate) fn find(&self, hash: u64, is_it: impl Fn(u32) -> bool) -> Option<u32> {
         let at = self.position(mix(hash), is_it)?;
         Some(self.buckets[at / WORDS].places[at % WORDS])
     }
 
-    /// Where in the table a key stands.
+    /// Position of a key in the table.
     #[inline]
     fn position(&self, mixed: u32, is_it: impl Fn(u32) -> bool) -> Option<usize> {
         if self.buckets.is_empty() {
@@ -100,7 +100,7 @@ impl Index {
         }
     }
 
-    /// Where a key stands that may be away: those that are, are met one after the other.
+    /// Position of a key that may be away: scans buckets until all away keys were met.
     #[cold]
     fn position_away(&self, home: usize, mixed: u32, is_it: impl Fn(u32) -> bool) -> Option<usize> {
         let (mut at, mut left) = (home, self.away[home]);
@@ -121,7 +121,7 @@ impl Index {
         None
     }
 
-    /// Asks for where a key is looked for first to be brought near.
+    /// Prefetches the first bucket of a lookup.
     #[inline]
     pub(crate) fn prefetch(&self, hash: u64) {
         let home = self.home(mix(hash));
@@ -131,7 +131,7 @@ impl Index {
         }
     }
 
-    /// The place of what is likely the key, without asking it.
+    /// The place that probably has the key, without comparing keys.
     #[inline]
     pub(crate) fn guess(&self, hash: u64) -> Option<u32> {
         let mixed = mix(hash);
@@ -140,7 +140,7 @@ impl Index {
         Some(bucket.places[lane])
     }
 
-    /// Notes the place of a key that is not in the table.
+    /// Inserts the place of a key that is not in the table.
     ///
     /// * `places` - as for [`Index::grow`].
     pub(crate) fn insert(&mut self, hash: u64, place: u32, places: usize) {
@@ -151,9 +151,9 @@ impl Index {
         self.len += 1;
     }
 
-    /// Room for one key more.
+    /// Makes room for one more key.
     ///
-    /// * `places` - so many there is room for in what holds the keys: the table grows when that does, at no other time.
+    /// * `places` - capacity of what holds the keys: the table grows with it, at no other time.
     #[inline]
     pub(crate) fn grow(&mut self, places: usize) {
         if OF * (self.len + 1) > TAKEN * WORDS * self.buckets.len() {
@@ -170,8 +170,8 @@ impl Index {
         }
     }
 
-    /// Where in the table a key belongs that is not in it, until the table next changes; `None` where the key is in it,
-    /// or the table has no room at all.
+    /// Position at which to insert a key that is not in the table, valid until the table changes; `None` if the key is
+    /// in it, or the table has no room at all.
     ///
     /// * `is_it` - as for [`Index::find`].
     #[inline]
@@ -183,22 +183,22 @@ impl Index {
         Some(self.room(self.home(mixed)))
     }
 
-    /// Notes the place of a key where [`Index::vacancy`] said.
+    /// Inserts a key at the position that [`Index::vacancy`] returned.
     #[inline]
     pub(crate) fn fill(&mut self, at: usize, hash: u64, place: u32) {
         self.put(at, mix(hash), place);
         self.len += 1;
     }
 
-    /// Takes out a key that is in the table.
+    /// Removes a key that is in the table.
     ///
-    /// * `place` - where it stands.
+    /// * `place` - its place.
     pub(crate) fn remove(&mut self, hash: u64, place: u32) {
         let gone = self.take(hash, |at| at == place);
         debug_assert!(gone.is_some(), "only what is in the table is taken out");
     }
 
-    /// Takes a key out and returns its place; `None` where it is not in the table.
+    /// Removes a key and returns its place; `None` if it is not in the table.
     ///
     /// * `is_it` - as for [`Index::find`].
     #[inline]
@@ -212,7 +212,7 @@ impl Index {
         Some(std::mem::replace(place, NONE))
     }
 
-    /// The first lane without an entry from a bucket on: the table is never full.
+    /// The first free lane from a bucket on: the table is never full.
     #[inline]
     fn room(&self, home: usize) -> usize {
         let mut at = home;
@@ -235,7 +235,7 @@ impl Index {
         (bucket.mixed[lane], bucket.places[lane]) = (mixed, place);
     }
 
-    /// The bucket behind one, round the end.
+    /// The next bucket, wrapping around at the end.
     #[inline]
     fn after(&self, at: usize) -> usize {
         if at + 1 < self.buckets.len() {
@@ -245,7 +245,7 @@ impl Index {
         }
     }
 
-    /// Where a key is looked for first: as far along the table as its mixed hash is among all. There are never 2^32
+    /// The bucket where a lookup begins: as far along the table as the mixed hash is in its range. There are never 2^32
     /// buckets.
     #[inline]
     #[allow(clippy::cast_possible_truncation, reason = "below the table's length")]
@@ -253,7 +253,7 @@ impl Index {
         ((u64::from(mixed) * self.buckets.len() as u64) >> u32::BITS) as usize
     }
 
-    /// Checks that the table knows so many keys, and where each stands that is away.
+    /// Checks that the table holds `len` keys, and the counts of keys that are away.
     pub(crate) fn validate(&self, len: usize) -> Result<(), String> {
         let (mut used, mut away) = (0, vec![0; self.away.len()]);
         for (at, bucket) in self.buckets.iter().enumerate() {
@@ -277,7 +277,7 @@ impl Index {
 #[inline]
 fn mix(hash: u64) -> u32 {
     let product = hash.wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    // Both halves count: keys are made of small numbers, so the product's middle would be poor.
+    // Uses both halves: keys are made of small numbers, so the product's middle would be poor.
     let mixed = (product ^ (product >> 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     u32::try_from(mixed >> 32).unwrap_or(0)
 }
@@ -291,7 +291,7 @@ mod tests {
     #[test]
     fn it_answers_as_a_plain_map_does_whatever_comes_and_goes() {
         let mut random = Random::new(1);
-        // Keys by place; few of them have one hash, as in a table of cells that some coordinates are mixed to.
+        // Keys by place; some cases have many keys with one hash, as in a table of cells whose coordinates collide.
         let cases = [
             (1 << 40, 1 << 41, 20_000),
             (3000, 6000, 20_000),
@@ -302,7 +302,7 @@ mod tests {
             let mut keys: Vec<Option<u64>> = Vec::new();
             let mut was_away = false;
             for round in 0..rounds {
-                // Grows, shrinks, and again.
+                // Grows, shrinks, and repeats.
                 let grows = round / 1500 % 2 == 0;
                 let key = random.bits() % kinds;
                 let hash = key % hashes;

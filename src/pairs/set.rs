@@ -1,4 +1,4 @@
-//! The set itself: dense slots, and what finds a pair by its key or by one of its bodies.
+//! The set itself: dense slots, with lookup of pairs by key or by body.
 
 use super::index::Index;
 use super::{Ended, PairKey, Spare};
@@ -14,21 +14,21 @@ mod validate;
 use free::Free;
 use lists::Lists;
 
-/// No slot is that high.
+/// Not a slot.
 const NONE: u32 = u32::MAX;
-/// Least places that the set grows by beyond what it needs.
+/// Least number of places that the set grows by beyond what it needs.
 const LEAST: usize = 16;
-/// The set grows by one place in so many beyond what it needs: what the pairs of a scene come and go by. With more of
-/// these places it takes more memory, and that of pairs is most of what a dense scene takes.
+/// The set grows by one extra place per `GROWTH` that it needs, to absorb the normal fluctuation of pairs. More extra
+/// places take more memory, and pairs are most of the memory of a dense scene.
 const GROWTH: usize = 8;
 
 /// The pairs of overlapping boxes that the filters allow.
 ///
-/// A slot freed in one tick is not given to another pair before the next tick, so memories keyed by slot are never
-/// mixed up as long as they are dropped for each `PairDelta::ended`.
+/// A slot freed in one tick is not given to another pair before the next tick, so data keyed by slot are never mixed up
+/// if they are dropped for each `PairDelta::ended`.
 #[derive(Clone, Debug)]
 pub struct PairSet {
-    /// By slot; where no pair stands, [`PairKey::NOBODY`].
+    /// By slot; [`PairKey::NOBODY`] where there is no pair.
     keys: Vec<PairKey>,
     lists: Lists,
     index: Index,
@@ -46,8 +46,8 @@ pub struct PairSet {
 impl PairSet {
     /// An empty set.
     ///
-    /// * `limit` - most pairs it holds (`config::Limits::pairs`). Beyond it pairs are counted in [`PairSet::missing`]
-    ///   and their bodies stand in [`PairSet::truncated`] until the pairs fit or part.
+    /// * `limit` - most pairs it holds (`config::Limits::pairs`). Further pairs are counted in [`PairSet::missing`] and
+    ///   their bodies are in [`PairSet::truncated`] until the pairs fit or part.
     #[must_use]
     pub fn new(limit: usize) -> Self {
         Self {
@@ -71,7 +71,7 @@ impl PairSet {
         self.len
     }
 
-    /// Whether there is no pair.
+    /// Returns whether there is no pair.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len == 0
@@ -89,21 +89,20 @@ impl PairSet {
         self.limit
     }
 
-    /// Pairs that overlap and are allowed, but did not fit when they were last counted, and those that came since. They
-    /// are counted in each update where they are few.
+    /// Pairs that overlap and are allowed but did not fit at the last count, plus those that came since. Recounted in
+    /// each update while they are few.
     #[must_use]
     pub fn missing(&self) -> u64 {
         self.missing
     }
 
-    /// Bodies with a missing pair, or that had one when these were last counted, in no order that means anything; their
-    /// verdict is unknown.
+    /// Bodies that miss a pair, or did at the last count, in arbitrary order; their verdict is unknown.
     #[must_use]
     pub fn truncated(&self) -> &[BodySlot] {
         &self.truncated
     }
 
-    /// Whether a pair of this body is missing.
+    /// Returns whether a pair of this body is missing.
     #[must_use]
     pub fn is_truncated(&self, body: BodySlot) -> bool {
         self.is_truncated
@@ -112,23 +111,23 @@ impl PairSet {
             .unwrap_or(false)
     }
 
-    /// The bodies of a pair; `None` where no pair is.
+    /// The bodies of a pair; `None` if there is no pair in the slot.
     #[must_use]
     pub fn get(&self, slot: PairSlot) -> Option<PairKey> {
         let key = self.keys.get(slot.index()).copied();
         key.filter(|key| *key != PairKey::NOBODY)
     }
 
-    /// Where the pair of two bodies is. Cost: one probe or two.
+    /// The slot of a pair of bodies. Cost: one or two probes.
     #[must_use]
     pub fn find(&self, key: PairKey) -> Option<PairSlot> {
         let is_it = |at: u32| self.keys[at as usize] == key;
         self.index.find(key.bits(), is_it).map(PairSlot)
     }
 
-    /// The pairs of a body, in no order that means anything.
+    /// The pairs of a body, in arbitrary order.
     ///
-    /// Cost: those pairs where the engine read such lists itself of late, else a look at every pair.
+    /// Cost: those pairs if the engine itself read such lists recently, otherwise a scan of every pair.
     pub fn pairs_of(&self, body: BodySlot) -> impl Iterator<Item = PairSlot> + '_ {
         let listed = self.lists.is_kept().then(|| self.lists.of(body));
         let looked = (!self.lists.is_kept()).then(|| {
@@ -143,7 +142,7 @@ impl PairSet {
             .chain(looked.into_iter().flatten())
     }
 
-    /// The bodies that a body is paired with, with the pair's slot. Cost: as [`PairSet::pairs_of`].
+    /// The partners of a body, with the pair's slot. Cost: as [`PairSet::pairs_of`].
     pub fn partners(&self, body: BodySlot) -> impl Iterator<Item = (PairSlot, BodySlot)> + '_ {
         self.pairs_of(body).map(move |slot| {
             let (low, high) = self.keys[slot.index()].slots();
@@ -151,7 +150,7 @@ impl PairSet {
         })
     }
 
-    /// The pairs of so many single bodies are about to be asked for: where that pays, it will cost those pairs alone.
+    /// Announces lookups of the pairs of `bodies` single bodies: builds the lists if that pays.
     pub(crate) fn list(&mut self, bodies: usize) {
         let Self { lists, keys, .. } = self;
         lists.ask(bodies, keys, live(keys));
@@ -162,7 +161,7 @@ impl PairSet {
         live(&self.keys)
     }
 
-    /// Begins a tick: slots freed in the one before may be used again, the lowest first.
+    /// Begins a tick: slots freed in the last one may be used again, the lowest first.
     pub(crate) fn open_tick(&mut self) {
         for slot in self.resting.drain(..) {
             self.free.put(slot);
@@ -170,7 +169,7 @@ impl PairSet {
         self.cut();
     }
 
-    /// Makes room for so many pairs more, as far as they may be stored. Pairs that begin together are told together, so
+    /// Reserves room for `more` pairs, as far as they may be stored. Pairs that begin together are passed together, so
     /// that memory grows once by what they need and not by doubling.
     fn reserve(&mut self, more: usize) {
         let more = more.min(self.limit - self.len);
@@ -191,10 +190,9 @@ impl PairSet {
         self.insert_at(at, key)
     }
 
-    /// Adds pairs, in this order, but for those that are in the set, as far as there is room for them; the others are
-    /// missed.
+    /// Adds pairs, in this order, except those that are in the set; those that do not fit are counted as missing.
     ///
-    /// * `begins` - whether one must be added.
+    /// * `begins` - whether a pair must be added.
     pub(crate) fn insert_all(
         &mut self,
         keys: &[PairKey],
@@ -223,14 +221,14 @@ impl PairSet {
         self.lists.weigh(0, self.len);
     }
 
-    /// Where in the index a pair that is not in the set is to be noted.
+    /// Position in the index for a pair that is not in the set.
     #[inline]
     fn vacancy(&self, key: PairKey) -> Option<usize> {
         let is_it = |at: u32| self.keys[at as usize] == key;
         self.index.vacancy(key.bits(), is_it)
     }
 
-    /// Adds a pair whose place in the index is known.
+    /// Adds a pair whose position in the index is known.
     #[inline]
     fn insert_at(&mut self, place: usize, key: PairKey) -> Option<PairSlot> {
         if self.len >= self.limit {
@@ -249,7 +247,7 @@ impl PairSet {
         Some(PairSlot(at))
     }
 
-    /// Takes a pair out; its slot rests until the next tick. `None` where no pair is.
+    /// Removes a pair; its slot rests until the next tick. `None` if there is no pair.
     pub(crate) fn remove(&mut self, slot: PairSlot) -> Option<PairKey> {
         let key = self.get(slot)?;
         self.lists.unlink(slot, key);
@@ -258,9 +256,9 @@ impl PairSet {
         Some(key)
     }
 
-    /// Takes pairs out that may be in the set, because their boxes have parted.
+    /// Removes those of the given pairs that are in the set, because their boxes have parted.
     ///
-    /// * `goes` - whether one does go.
+    /// * `goes` - whether a pair is really removed.
     pub(crate) fn part(
         &mut self,
         keys: &[PairKey],
@@ -279,7 +277,7 @@ impl PairSet {
                 self.bury(slot);
             }
         }
-        // Each step for all pairs before the next one: memory for the steps to come is asked for meanwhile.
+        // Each step for all pairs before the next step: memory for the next steps is prefetched meanwhile.
         if self.lists.is_kept() {
             let ended = &ended[first..];
             for (at, Ended { slot, key, .. }) in ended.iter().enumerate() {
@@ -289,14 +287,14 @@ impl PairSet {
         }
     }
 
-    /// Lets a slot rest.
+    /// Frees a slot from the next tick on.
     fn bury(&mut self, slot: PairSlot) {
         self.keys[slot.index()] = PairKey::NOBODY;
         self.resting.push(slot.0);
         self.len -= 1;
     }
 
-    /// Empties the set, keeps the memory; every slot may be used again at once.
+    /// Clears the set, keeps the memory; every slot may be reused at once.
     pub(crate) fn clear(&mut self) {
         self.keys.clear();
         self.lists.clear();
@@ -307,7 +305,7 @@ impl PairSet {
         self.forget_missing();
     }
 
-    /// Nothing is missing.
+    /// Resets the missing pairs.
     pub(crate) fn forget_missing(&mut self) {
         self.missing = 0;
         for body in self.truncated.drain(..) {
@@ -315,7 +313,7 @@ impl PairSet {
         }
     }
 
-    /// A pair of two bodies did not fit.
+    /// Counts a pair that did not fit.
     pub(crate) fn miss(&mut self, key: PairKey) {
         self.missing += 1;
         let (low, high) = key.slots();
@@ -323,7 +321,7 @@ impl PairSet {
         self.mark_truncated(high);
     }
 
-    /// What was missing before may be missing still: so many pairs, of these bodies.
+    /// Keeps at least this number of missing pairs, and these bodies as truncated, from before.
     pub(crate) fn go_on_missing(&mut self, pairs: u64, bodies: &[BodySlot]) {
         self.missing = self.missing.max(pairs);
         for body in bodies {
@@ -331,7 +329,7 @@ impl PairSet {
         }
     }
 
-    /// A body's pairs are not all there.
+    /// Marks a body whose pairs are incomplete.
     fn mark_truncated(&mut self, body: BodySlot) {
         if self.is_truncated.len() <= body.index() {
             self.is_truncated.resize(body.index() + 1, false);
@@ -343,7 +341,7 @@ impl PairSet {
     }
 }
 
-/// The pairs among the keys by slot.
+/// The pairs in an array of keys by slot.
 fn live(keys: &[PairKey]) -> impl Iterator<Item = (PairSlot, PairKey)> + Clone + '_ {
     let slots = (0_u32..).map(PairSlot);
     slots

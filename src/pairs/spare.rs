@@ -1,24 +1,24 @@
-//! When memory that a crowd of pairs took is given back.
+//! When to give back memory that a crowd of pairs took.
 //!
-//! In: how much there is room for, and how much is in use. Out: whether the rest goes. Pairs come and go by turns, and
-//! what is given back and taken again in each turn costs more than to keep it: so only what was far too much for very
-//! many ticks goes, and nothing where little can be spared. Counted, so that a replay does alike.
+//! In: how much room there is, and how much is in use. Out: whether the rest is freed. Pairs come and go in waves, and
+//! freeing and allocating in each wave costs more than keeping the memory: so it is freed only when it was far too much
+//! for very many ticks, and never when little could be saved. Counted in ticks, so that a replay does the same.
 
-/// Room for fewer is kept: some MiB where most is known of a pair.
+/// Room for fewer entries is kept: at most some MiB.
 const LEAST: usize = 1 << 14;
-/// There is room for so many times what is in use.
+/// Room of more than this many times what is in use is too much.
 const TIMES: usize = 4;
-/// In so many ticks, one after the other: some ten seconds.
+/// Number of consecutive ticks with too much room: some ten seconds.
 const TICKS: u32 = 1 << 10;
 
-/// How long there has been far too much room.
+/// For how long there has been too much room.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Spare {
     ticks: u32,
 }
 
 impl Spare {
-    /// Whether room that is not in use is to be given back; to be asked once in each tick.
+    /// Returns whether to free unused room; must be called once in each tick.
     ///
     /// * `room`, `used` - in entries.
     pub(crate) fn is_over(&mut self, room: usize, used: usize) -> bool {
@@ -31,7 +31,7 @@ impl Spare {
         is_over
     }
 
-    /// Cuts a list that runs parallel to what is in use, and gives back the memory of more than half as much again.
+    /// Truncates a list that is parallel to what is in use, and frees memory beyond half as much again.
     pub(crate) fn cut<T>(list: &mut Vec<T>, used: usize) {
         list.truncate(used);
         list.shrink_to(used + used / 2);

@@ -1,4 +1,4 @@
-//! Rows of `bodies`, one byte a body, and names.
+//! Rows of `bodies`, one-byte verdicts of bodies, and names.
 
 use crate::wire::{BODY_NAME_LEN, BodyRow, BodyStatus, MessageHeader, NameRow, Outbox, Verdict};
 use crate::world::Body;
@@ -38,8 +38,8 @@ impl Publisher {
         0
     }
 
-    /// The worst verdict of each body over its pairs. A body of unknown place, or with a pair
-    /// that did not fit into the pair set, is never better than `possible`.
+    /// The worst verdict of each body over its pairs. For a body of unknown place, or with a pair that did not fit into
+    /// the pair set, never better than `possible`.
     fn worst_of_each(&mut self, view: &View<'_>) {
         self.verdicts.clear();
         self.verdicts

@@ -1,10 +1,10 @@
-//! Rows of `changes`: what is new in the list of pairs since the tick before, at the cost of what is new.
+//! Rows of `changes`: what is new in the list of pairs since the last tick, at a cost proportional to that.
 //!
-//! In: the list, with what of it is news, and the pairs whose rows were dropped. Out: rows that make the list of the
-//! tick before that of this one; the whole list where its readers have none to build on.
+//! In: the list with its news, and the pairs whose rows were dropped. Out: rows that turn the list of the last tick
+//! into that of this one; the whole list if its readers have no base.
 //!
-//! It is cut off as `pairs` is, so that who keeps a list from it holds the rows that `pairs` has: where not all fit the
-//! message is the whole list, and so is the next. A message that changes the list is therefore never cut off.
+//! It is cut off like `pairs`, so that a reader who builds the list from it has the same rows as `pairs`: if not all
+//! fit, the message is the whole list, and so is the next. A message with changes is therefore never cut off.
 
 use crate::ids::small;
 use crate::wire::{ChangesHeader, MessageHeader, Outbox, PairRow};
@@ -14,14 +14,14 @@ use super::listing::NO_EVENT;
 use super::owed::Debt;
 use super::{AHEAD, Publisher, View};
 
-/// What the next message builds on, and memory kept over calls.
+/// The base of the next message, and memory kept across calls.
 #[derive(Debug, Default)]
 pub(super) struct Chain {
-    /// The tick whose list its readers hold; 0: they hold none, or not all of it.
+    /// The tick whose list the readers have; 0: none, or not all of it.
     base_tick: u64,
     /// Pairs whose rows, or whose contacts, were dropped in this tick, by ids.
     pub(super) dropped: Vec<Ids>,
-    /// Places of the rows of the pairs that are told, by ids.
+    /// Indices of the rows to send, by ids.
     pub(super) places: Vec<u32>,
 }
 
@@ -31,16 +31,16 @@ impl Chain {
         self.dropped.clear();
     }
 
-    /// What was told of a pair is dropped; it may get another row yet.
+    /// Records that the row of a pair, or its contacts, was dropped; it may get another row yet.
     ///
-    /// * `told` - whether anybody is told.
+    /// * `told` - whether the message has readers.
     pub(super) fn note_dropped(&mut self, told: bool, ids: Ids) {
         if told {
             self.dropped.push(ids);
         }
     }
 
-    /// The tick whose list a message of this one may build on; 0: none.
+    /// The tick whose list a message of this tick may build on; 0: none.
     pub(super) fn base(&self, tick: u64) -> u64 {
         if self.base_tick + 1 == tick {
             self.base_tick
@@ -51,9 +51,9 @@ impl Chain {
 
     /// Ends a tick.
     ///
-    /// * `base_tick` - what the next may build on; 0: nothing.
-    /// * `all` - how many rows the list has: how many are new differs from tick to tick, and room for all is made when
-    ///   they are more than ever.
+    /// * `base_tick` - the base of the next message; 0: none.
+    /// * `all` - number of rows of the list: the number of new ones varies from tick to tick, so memory for all is
+    ///   reserved when there are more than ever.
     pub(super) fn end(&mut self, base_tick: u64, all: usize) {
         self.base_tick = base_tick;
         self.dropped.clear();
@@ -65,7 +65,7 @@ impl Chain {
     /// Structure check, between two ticks.
     ///
     /// # Errors
-    /// One sentence on the first thing that does not hold.
+    /// One sentence on the first check that fails.
     pub(super) fn validate(&self, tick: u64) -> Result<(), String> {
         if self.base_tick > tick {
             return Err(format!(
@@ -79,7 +79,7 @@ impl Chain {
         Ok(())
     }
 
-    /// The list is made anew, and nobody knows what is new in it.
+    /// The list is made from scratch, and what is new in it is unknown.
     pub(super) fn break_off(&mut self) {
         self.base_tick = 0;
     }
@@ -88,7 +88,7 @@ impl Chain {
 impl Publisher {
     /// Fills `changes`.
     ///
-    /// * `left_out` - how many rows of the list do not fit.
+    /// * `left_out` - rows of the list that do not fit.
     pub(super) fn fill_changes(
         &mut self,
         view: &mut View<'_>,
@@ -121,16 +121,17 @@ impl Publisher {
             },
         };
         let all = self.listing.len();
-        // A row that was told with what was owed is another one without it, which no mark says: nothing builds on it.
+        // A row sent with owed events differs from the plain row, and no mark records that: the next message must not
+        // build on it.
         let holds_on = left_out == 0 && !owes;
         self.chain.end(if holds_on { view.tick } else { 0 }, all);
         let more = all.saturating_sub(out.changes.len());
         out.changes.reserve(more);
     }
 
-    /// Chooses which rows are sent; returns the tick that they build on, 0 where they are the whole list.
+    /// Chooses which rows are sent; returns the base tick, 0 if they are the whole list.
     ///
-    /// * `holds` - whether the list of the tick before may be built on.
+    /// * `holds` - whether the list of the last tick may be the base.
     fn choose_changes(&mut self, holds: bool, tick: u64) -> u64 {
         let (chain, listing, chosen) = (&mut self.chain, &self.listing, &self.chosen);
         let all = small(listing.len());
@@ -156,10 +157,10 @@ impl Publisher {
         0
     }
 
-    /// Appends the chosen rows, and those that say which pairs have left the list.
+    /// Appends the chosen rows, and rows for pairs that have left the list.
     ///
     /// * `whole` - whether they are the whole list.
-    /// * `debt` - what is owed to its readers: that is told as well.
+    /// * `debt` - events owed to its readers: these are sent as well.
     fn push_changes(
         &self,
         view: &mut View<'_>,
@@ -180,7 +181,7 @@ impl Publisher {
                 rows.push(self.last_row(view, ids, debt));
             }
             let row = self.owed_row(view, row, debt);
-            // It was listed for an event that cancels what is owed.
+            // It was listed for an event that cancels an owed one.
             if !(whole && row.has_left()) {
                 rows.push(row);
             }
@@ -190,7 +191,7 @@ impl Publisher {
         }
     }
 
-    /// The row of a pair that has left the list, or is told of for what is owed alone.
+    /// The row of a pair that has left the list, or is sent only for owed events.
     fn last_row(&self, view: &mut View<'_>, ids: Ids, debt: &mut Debt) -> PairRow {
         let row = Self::row_of_apart(view, ids, NO_EVENT);
         let row = self.owed_row(view, &row, debt);

@@ -1,9 +1,9 @@
-//! Rows of `contact_changes`: the contacts of the pairs of which there is something new since the tick before, and of
-//! those that have none any more that they are gone.
+//! Rows of `contact_changes`: the contacts of the pairs with news since the last tick, and a row for each pair that has
+//! no contacts any more.
 //!
-//! In: the list of pairs, what of it is news, and the pairs whose contacts were dropped. Out: rows that make the
-//! contacts of the tick before those of this one; all of them where readers have nothing to build on. A pair is told
-//! whole, or not at all.
+//! In: the list of pairs with its news, and the pairs whose contacts were dropped. Out: rows that turn the contacts of
+//! the last tick into those of this one; all of them if readers have no base. The contacts of a pair are sent all or
+//! none.
 
 use crate::ids::small;
 use crate::wire::{ChangesHeader, ContactRow, MessageHeader, Outbox};
@@ -14,8 +14,8 @@ use super::{AHEAD, Publisher, View};
 impl Publisher {
     /// Fills `contact_changes`.
     ///
-    /// * `header` - with how many contacts do not fit.
-    /// * `told` - how many do.
+    /// * `header` - with the number of contacts that do not fit.
+    /// * `told` - number of contacts that fit.
     pub(super) fn fill_contact_changes(
         &mut self,
         view: &mut View<'_>,
@@ -46,7 +46,7 @@ impl Publisher {
         out.contact_changes.reserve(more);
     }
 
-    /// Chooses the pairs of which there is something new; returns the tick that this builds on, 0 where all are chosen.
+    /// Chooses the pairs with news; returns the base tick, 0 if all are chosen.
     fn choose_new_contacts(&mut self, tick: u64, all: usize) -> u64 {
         let (chain, listing) = (&mut self.contact_chain, &self.listing);
         let base_tick = chain.base(tick);
@@ -71,7 +71,7 @@ impl Publisher {
         base_tick
     }
 
-    /// Chooses every pair that has contacts, or those that fit; returns 0, for it builds on nothing.
+    /// Chooses every pair that has contacts, or those that fit; returns 0, as there is no base.
     fn choose_all_contacts(&mut self, cut: bool) -> u64 {
         let (chain, listing, chosen) = (&mut self.contact_chain, &self.listing, &self.chosen);
         chain.dropped.clear();

@@ -78,8 +78,7 @@ impl Publisher {
         out.contacts_header = header;
     }
 
-    /// Keeps the contacts of rows that are not fresh and stood side by side, from a place on; returns the place behind
-    /// them.
+    /// Keeps the contacts of rows that are not fresh and were adjacent, from an index on; returns the index after them.
     fn keep_contacts(&mut self, from: usize, kept: &mut Kept<ContactRow>) -> usize {
         let marks = &mut self.listing.marks[from..];
         let first = marks.first().map_or(0, |mark| mark.contacts.first);
@@ -102,18 +101,18 @@ impl Publisher {
         from + count
     }
 
-    /// Chooses the pairs whose contacts fit: the deepest, of equally deep ones those with the smaller ids. The first is
-    /// told, whatever the limit is. Returns how many contacts they have.
+    /// Chooses the pairs whose contacts fit: the deepest, with equal depth those with the smaller ids. The first is
+    /// always sent, whatever the limit. Returns how many contacts they have.
     fn choose_pairs(&mut self) -> usize {
         let (by_depth, rows) = (&mut self.contact_pairs, &self.listing);
         by_depth.clear();
         let pairs = rows.iter().enumerate().filter(|(_, row)| row.contacts > 0);
         by_depth.extend(pairs.map(|(at, row)| (row.best_m, small(at), row.contacts)));
-        // Halves what the limit lies in, until it is one pair; a sort of all would take several times as long.
+        // Bisects the part that contains the limit, down to one pair; a sort of all would take several times as long.
         let (mut from, mut to, mut room) = (0, by_depth.len(), self.limits.contact_rows);
         while from < to {
             let middle = (to - from) / 2;
-            // Rows are ordered by ids, and so are their places.
+            // Rows are ordered by ids, and so are their indices.
             by_depth[from..to]
                 .select_nth_unstable_by(middle, |x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
             let deeper = &by_depth[from..=from + middle];
@@ -149,7 +148,7 @@ pub(super) fn push_rows(view: &View<'_>, slot: PairSlot, out: &mut Vec<ContactRo
         if let Some(witness) = finding.witness {
             let mut row = closest_row(a, b, witness);
             let gap = finding.gap;
-            // An estimate is never outside what is proved.
+            // An estimate is never outside the proven interval.
             row.gap_m = row.gap_m.max(gap.min).min(gap.max);
             (row.gap_min_m, row.gap_max_m) = (gap.min, gap.max);
             row.flags = if finding.level == Level::Exact {
@@ -165,7 +164,7 @@ pub(super) fn push_rows(view: &View<'_>, slot: PairSlot, out: &mut Vec<ContactRo
     let current = finding.level == Level::Exact && tick >= finding.tested;
     let start = out.len();
     let is_one_pair = a.shapes.len() == 1 && b.shapes.len() == 1;
-    // Of meshes the gap of a contact is measured along its own normal.
+    // With meshes the gap of a contact is measured along its own normal.
     let are_convex = [a, b]
         .iter()
         .all(|body| body.shapes.iter().all(|p| p.shape.mesh().is_none()));
@@ -173,7 +172,7 @@ pub(super) fn push_rows(view: &View<'_>, slot: PairSlot, out: &mut Vec<ContactRo
         let mut row = contact_row(a, b, contact);
         if !current {
             row.flags = contact_flags::ESTIMATE;
-            // What was proved of these shapes held at another pose: what holds at this one is said of the bodies.
+            // What was proven for these shapes was at another pose; the bounds for this pose are those of the bodies.
             row.gap_min_m = finding.gap.min;
             row.gap_max_m = if is_one_pair {
                 finding.gap.max
@@ -197,7 +196,7 @@ pub(super) fn push_rows(view: &View<'_>, slot: PairSlot, out: &mut Vec<ContactRo
     });
 }
 
-/// How many contact rows an active pair has.
+/// Number of contact rows of an active pair.
 pub(super) fn contacts_of(view: &View<'_>, slot: PairSlot, finding: &Finding<'_>) -> usize {
     match finding.verdict {
         Verdict::Colliding => view.narrow.contacts(slot).0.len(),

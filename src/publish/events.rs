@@ -1,8 +1,8 @@
-//! Begin, persist, end: what is certified about each pair's collisions, and events that still wait to be sent.
+//! Begin, persist, end: what is certified about each pair's collisions, and events that wait to be sent.
 //!
 //! Events are about certified collisions only. With less budget a begin comes later; it is never wrong. An event that
-//! does not fit into a message waits here with its range, also after its pair is gone. A touch on the way of a
-//! continuous body that is over at this tick's poses is a begin and an end of one tick: a pass.
+//! does not fit into a message waits here with its range, even after its pair is gone. If a continuous body touched
+//! during its motion but no longer does at this tick's poses, that is a begin and an end in one tick: a pass.
 
 mod adrift;
 mod idle;
@@ -20,18 +20,18 @@ use adrift::Adrift;
 /// A pair by its bodies' ids, the smaller first.
 pub(super) type Ids = (BodyId, BodyId);
 
-/// The ticks in which something may have happened, both ends included.
+/// The ticks in which something may have happened, both bounds included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Ticks {
     pub(super) first: u64,
     pub(super) last: u64,
 }
 
-/// The events of one pair that wait to be sent: an end, then a begin or a pass.
+/// The waiting events of one pair: an end, then a begin or a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct PairEvent {
     pub(super) ids: Ids,
-    /// Order in which it happened, for events of one pair.
+    /// Order of occurrence, for events of one pair.
     seq: u64,
     pub(super) end: Option<(Ticks, EndCause)>,
     pub(super) begin: Option<Ticks>,
@@ -40,9 +40,10 @@ pub(super) struct PairEvent {
 }
 
 impl PairEvent {
-    /// Takes what happened next to the same pair; returns how many begins and their ends that were never sent cancel.
+    /// Adds what happened next to the same pair; returns how many begins, with their ends, cancel because they were
+    /// never sent.
     pub(super) fn follow(&mut self, next: &Self) -> u64 {
-        // Whatever follows a pass that was never sent: its begin and its end cancel.
+        // A pass that was never sent is dropped by any later event: its begin and its end cancel.
         let mut cancelled = u64::from(self.pass.take().is_some());
         self.pass = next.pass;
         if next.end.is_some() {
@@ -55,7 +56,7 @@ impl PairEvent {
         if next.begin.is_some() {
             self.begin = next.begin;
         }
-        // A row has one cause: that the pair touched on its way as well is told by its flag.
+        // A row has one cause; its flag shows that the pair also touched during its motion.
         let by_cause = (self.end).is_some_and(|(_, cause)| cause != EndCause::Separated);
         if by_cause && self.pass.take().is_some() {
             cancelled += 1;
@@ -63,12 +64,12 @@ impl PairEvent {
         cancelled
     }
 
-    /// Whether nothing is left of it to tell.
+    /// Returns whether nothing is left to report.
     pub(super) fn is_over(&self) -> bool {
         self.end.is_none() && self.begin.is_none() && self.pass.is_none()
     }
 
-    /// Whether it is a pass and nothing else.
+    /// Returns whether it is a pass and nothing else.
     pub(super) fn is_pass_alone(&self) -> bool {
         self.pass.is_some() && self.end.is_none() && self.begin.is_none()
     }
@@ -84,15 +85,15 @@ pub(super) struct History {
     pub(super) tick: u64,
     /// Certified colliding, and not certified ended since.
     pub(super) colliding: bool,
-    /// Certified colliding at the poses of the tick before.
+    /// Certified colliding at the poses of the last tick.
     was_colliding: bool,
-    /// What was certified last is a touch on the way to poses that were not decided.
+    /// The last certified result is a touch during the motion to poses that were not decided.
     on_way: bool,
-    /// What was certified last is of poses whose tick did not tell it.
+    /// The last certified result is for poses of an earlier tick, not reported in that tick.
     late: bool,
-    /// The first tick of a begin of that kind; 0: none was.
+    /// The first tick of such a late begin; 0: none.
     late_begin: u64,
-    /// Last tick in which the pair was seen to be more than plainly apart.
+    /// Last tick in which the pair was found to be more than plainly apart.
     active: u64,
     /// First tick in which it may have collided; 0: not seen yet.
     born: u64,
@@ -112,8 +113,8 @@ impl History {
         born: 0,
     };
 
-    /// A pair that was certified colliding or near stayed so in every tick up to `last`, unless something else was
-    /// certified of it since: nothing is said of a pair that nothing happens to.
+    /// A pair that was certified colliding or near has stayed so in every tick up to `last`, unless something else was
+    /// certified since: pairs without changes are not reported.
     fn go_on_to(&mut self, last: u64) {
         let stays = matches!(self.verdict, Verdict::Colliding | Verdict::Near);
         if stays && self.active < last {
@@ -121,13 +122,13 @@ impl History {
         }
     }
 
-    /// First tick in which it may have ended: after a touch on the way to poses that were not decided that very tick.
+    /// First tick in which it may have ended: after a touch during the motion to undecided poses, that very tick.
     fn next_first(&self) -> u64 {
         self.tick + u64::from(!self.on_way)
     }
 }
 
-/// The history of every pair and the events that wait.
+/// The history of every pair and the waiting events.
 #[derive(Debug, Default)]
 pub(super) struct Events {
     /// By `PairSlot`.
@@ -135,19 +136,20 @@ pub(super) struct Events {
     spare: Spare,
     /// Histories whose slots were lost, until they are found again.
     adrift: Vec<Adrift>,
-    /// By ids; one entry a pair after [`Events::merge`].
+    /// By ids; one entry per pair after [`Events::merge`].
     waiting: Vec<PairEvent>,
-    /// Those that the messages of the last tick told, by ids.
+    /// Events sent in the messages of the last tick, by ids.
     told: Vec<PairEvent>,
     seq: u64,
     /// `seq` before this tick.
     before: u64,
-    /// Begins and their ends that were both never sent.
+    /// Begins, with their ends, that were both never sent.
     pub(super) cancelled: u64,
 }
 
 impl Events {
-    /// Whether a touch on the way is news: a collision that was told before goes on from the last tick's poses.
+    /// Returns whether a touch during the motion is news; it is not if a reported collision just continues from the
+    /// last tick's poses.
     pub(super) fn is_news(&self, slot: PairSlot, passage: Passage) -> bool {
         match passage {
             Passage::Touched(toi) => toi.max > 0.0 || !self.history(slot).was_colliding,
@@ -156,10 +158,9 @@ impl Events {
         }
     }
 
-    /// Takes the pairs that ended, and those that were active and are now proved apart.
+    /// Takes the pairs that ended, and those that were active and are now proven apart.
     ///
-    /// Then comes [`Events::certify`] for each active pair of which there may be something new to say, and
-    /// [`Events::merge`].
+    /// Must be followed by [`Events::certify`] for each active pair that may have news, and [`Events::merge`].
     pub(super) fn begin(&mut self, tick: u64, world: &World, narrow: &Narrow, delta: &PairDelta) {
         self.before = self.seq;
         for ended in &delta.ended {
@@ -176,7 +177,7 @@ impl Events {
             }
         }
         for &slot in narrow.left() {
-            // Touched by an earlier tick, or nothing was ever certified of it that could end.
+            // Handled by an earlier tick, or nothing certified that could end.
             if self
                 .histories
                 .get(slot.index())
@@ -197,23 +198,23 @@ impl Events {
             .unwrap_or(History::NONE)
     }
 
-    /// Events that wait, by ids.
+    /// Waiting events, by ids.
     pub(super) fn waiting(&self) -> &[PairEvent] {
         &self.waiting
     }
 
-    /// What is sent first where not all fit: what found no room in ticks before, the oldest first; then what is new.
+    /// Send order if not all fit: events that did not fit in earlier ticks, the oldest first; then new ones.
     pub(super) fn turn(&self, event: u32) -> u64 {
         let seq = self.waiting.get(event as usize).map(|event| event.seq);
         seq.filter(|seq| *seq <= self.before).unwrap_or(u64::MAX)
     }
 
-    /// Events that the messages of the last tick told, by ids.
+    /// Events sent in the messages of the last tick, by ids.
     pub(super) fn told(&self) -> &[PairEvent] {
         &self.told
     }
 
-    /// Nothing waits any more of what was sent: all events but those `kept` says to keep.
+    /// Removes the events that were sent: all except those that `kept` keeps.
     pub(super) fn sent(&mut self, mut kept: impl FnMut(Ids) -> bool) {
         let told = &mut self.told;
         told.clear();
@@ -244,13 +245,13 @@ impl Events {
         }
         history.go_on_to(tick - 1);
         history.ids = ids;
-        // Told of the last tick's poses: of a collision that was not certified there, a touch at them is news.
+        // Reported for the last tick's poses: a touch there is news only if the collision was not certified at them.
         let told = !history.on_way && !history.late;
         history.was_colliding = history.colliding && history.tick + 1 == tick && told;
         let late_begin = std::mem::take(&mut history.late_begin);
         history.late = false;
-        // Not active in the tick before: proved apart there by its certificate or by its boxes, unless it is new and a
-        // body of it was not in, not known, or not looked for there.
+        // Not active in the last tick: proven apart there by its certificate or its boxes, unless the pair is new and
+        // one of its bodies was missing, unknown, or not searched there.
         let unseen = (finding.born == tick)
             .then(|| {
                 earlier(
@@ -285,7 +286,7 @@ impl Events {
             Verdict::Near | Verdict::Apart => {
                 if history.colliding {
                     self.push(history.ids, Some((ticks, EndCause::Separated)), None);
-                    // Its begin, which was not told yet, cancels with this end: the way tells of both.
+                    // Its begin, which was not reported yet, cancels with this end: the pass reports both.
                     if touched && late_begin != 0 {
                         let first = late_begin;
                         self.push_pass(history.ids, Ticks { first, last: tick });
@@ -330,7 +331,7 @@ impl Events {
         }
     }
 
-    /// One entry a pair, by ids: a begin that was never sent and the end that follows it cancel.
+    /// One entry per pair, by ids: a begin that was never sent and the following end cancel.
     pub(super) fn merge(&mut self) {
         self.waiting
             .sort_unstable_by_key(|event| (event.ids, event.seq));

@@ -1,23 +1,23 @@
-//! Which rows of the list are sent where not all fit, and where they stood in the message of the tick before.
+//! Which rows of the list are sent if not all fit, and where they were in the message of the last tick.
 //!
-//! Refused: to sort all rows for it, and to make all of them anew. Of some hundred thousand that took longer than all
-//! else in the tick.
+//! Refused: sorting all rows for it, and making all of them again. With some hundred thousand rows that took longer
+//! than everything else in the tick.
 
 use super::Publisher;
 use super::listing::Mark;
 
-/// By what a row is chosen, the least first; at last its place, which is by ids.
+/// Sort key by which rows are chosen, the least first; the last part is its index, which is by ids.
 pub(super) type Rank = (u64, u8, i64, u32);
 
-/// Places of the rows of the list in a message.
+/// Positions of the rows of the list in a message.
 #[derive(Debug, Default)]
 pub(super) enum Stood {
     /// There was no message.
     #[default]
     Nowhere,
-    /// All were sent, so they stood as in the list.
+    /// All were sent, so they were placed as in the list.
     Listed,
-    /// By place in the list: the place in the message, or [`LEFT_OUT`].
+    /// By index in the list: the position in the message, or [`LEFT_OUT`].
     Chosen(Vec<u32>),
 }
 
@@ -25,7 +25,7 @@ pub(super) enum Stood {
 const LEFT_OUT: u32 = u32::MAX;
 
 impl Stood {
-    /// Where the row of a mark stood, if it is to be sent as it was.
+    /// Old position of the row of a mark, if it is sent unchanged.
     pub(super) fn place(&self, mark: &Mark) -> Option<u32> {
         if mark.fresh {
             return None;
@@ -42,8 +42,7 @@ impl Stood {
 }
 
 impl Publisher {
-    /// Chooses what is sent where not all fit, events that waited and then the best rank first; returns how many are
-    /// left out.
+    /// Chooses what is sent if not all fit: events that waited first, then by rank; returns how many are left out.
     pub(super) fn choose_rows(&mut self) -> u64 {
         let (most, listing, ranked) = (self.limits.pair_rows, &self.listing, &mut self.ranked);
         let left_out = listing.len().saturating_sub(most);
@@ -64,12 +63,12 @@ impl Publisher {
         left_out as u64
     }
 
-    /// Notes where the rows of the list stand that were just sent, in order.
+    /// Records the positions of the rows just sent, in order.
     ///
-    /// * `cut` - whether they are the chosen ones, and not all.
+    /// * `cut` - whether only the chosen ones were sent.
     pub(super) fn note_places(&mut self, cut: bool) {
         if !cut {
-            // The memory is kept for as long as rows do not fit; a list that fits has no use for it.
+            // The memory is kept only as long as rows do not fit; a list that fits does not use it.
             self.stood = Stood::Listed;
             return;
         }

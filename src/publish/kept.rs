@@ -1,26 +1,26 @@
-//! A message that stays from tick to tick: rows that have nothing new to say are left where they are, or moved.
+//! A message that is kept from tick to tick: rows without changes stay in place, or are moved.
 //!
-//! In: for each pair in order, where its rows stood in the message of the last tick and whether they still hold. Out:
-//! the message of this tick, in the same memory: rows that stand where they stood are not touched, which are those in
-//! front of the first pair that came or went, and those behind it as long as as many rows went as came.
+//! In: for each pair in order, where its rows were in the message of the last tick and whether they are still valid.
+//! Out: the message of this tick, in the same memory. Rows that keep their position are not touched: those before the
+//! first pair that came or went, and later ones as long as as many rows went as came.
 //!
-//! Refused: to put the message together anew from the old one. Each tick in which a pair came or went then took a copy
-//! of all, which in a scene mostly at rest was most of what publishing took.
+//! Refused: composing the message from the old one again. Each tick in which a pair came or went then copied
+//! everything, which was most of the cost of publishing a scene mostly at rest.
 
 use std::ops::Range;
 
-/// What a message is made of, while it is gone through.
+/// State while a message is composed.
 #[derive(Debug)]
 pub(super) struct Kept<T> {
-    /// Rows that are settled.
+    /// Rows composed so far.
     at: usize,
-    /// Of the old message, in order: what stays in the new one.
+    /// The rows of the old message that stay, in order.
     runs: Vec<Run>,
-    /// Rows that are made now, in order: they fill what the runs leave free.
+    /// New rows, in order: they fill the gaps between the runs.
     made: Vec<T>,
 }
 
-/// Rows that stay side by side.
+/// Adjacent rows that stay together.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     from: usize,
@@ -52,16 +52,16 @@ impl<T> Default for Kept<T> {
 }
 
 impl<T: Copy> Kept<T> {
-    /// Starts at the top of the message.
+    /// Starts at the beginning of the message.
     pub(super) fn begin(&mut self) {
         self.at = 0;
         self.runs.clear();
         self.made.clear();
     }
 
-    /// The next rows are those that stood at `was` in the last tick; spans come in the order in which they stood.
+    /// The next rows are those at `was` in the last tick; spans come in their old order.
     ///
-    /// * returns - where they stand now.
+    /// * returns - where they are now.
     pub(super) fn keep(&mut self, was: Span) -> Span {
         let (from, to, len) = (was.first as usize, self.at, was.len as usize);
         match self.runs.last_mut() {
@@ -72,9 +72,9 @@ impl<T: Copy> Kept<T> {
         self.span(len)
     }
 
-    /// The next rows are made now, by `make`, which appends them.
+    /// The next rows are new; `make` appends them.
     ///
-    /// * returns - where they stand.
+    /// * returns - where they are.
     pub(super) fn make(&mut self, make: impl FnOnce(&mut Vec<T>)) -> Span {
         let before = self.made.len();
         make(&mut self.made);
@@ -83,13 +83,13 @@ impl<T: Copy> Kept<T> {
 
     /// Ends the message.
     ///
-    /// * `out` - that of the last tick, and then of this one.
+    /// * `out` - the message of the last tick, then that of this one.
     pub(super) fn finish(&mut self, out: &mut Vec<T>) {
         if self.runs.is_empty() {
             std::mem::swap(out, &mut self.made);
             return;
         }
-        // Where there are more rows than before, some are made.
+        // If there are more rows than before, some are new.
         if let Some(row) = self.made.first()
             && out.len() < self.at
         {
@@ -98,14 +98,14 @@ impl<T: Copy> Kept<T> {
         self.move_runs(out);
         self.put_made(out);
         out.truncate(self.at);
-        // In which tick how many rows are made is not known: room for all is made when they are more than ever.
+        // The number of new rows varies from tick to tick: room for all is reserved when there are more than ever.
         self.runs.clear();
         self.runs.reserve(out.len() / 2);
         self.made.clear();
         self.made.reserve(out.len());
     }
 
-    /// Writes what is made between the runs, and behind the last.
+    /// Writes the new rows between the runs, and after the last.
     fn put_made(&self, out: &mut [T]) {
         let (mut free, mut rows) = (0, self.made.as_slice());
         let ends = self.runs.iter().map(|run| (run.to, run.to + run.len));
@@ -118,8 +118,8 @@ impl<T: Copy> Kept<T> {
         }
     }
 
-    /// Moves what stays to its place. Runs keep their order, so one that moves up can only be in the way of one that
-    /// moves up behind it, which goes first, and one that moves down only of one that moves down before it.
+    /// Moves the kept runs to their positions. Runs keep their order, so a run that moves up can only overwrite a later
+    /// one that moves up too, which is moved first; a run that moves down only an earlier one that moves down too.
     fn move_runs(&self, out: &mut [T]) {
         let mut put = |run: &Run| {
             if run.from != run.to && run.old().end.max(run.to + run.len) <= out.len() {
@@ -138,7 +138,7 @@ impl<T: Copy> Kept<T> {
         }
     }
 
-    /// Rows that the last message had.
+    /// Number of rows of the last message.
     pub(super) fn rows(&self) -> usize {
         self.at
     }
@@ -165,12 +165,12 @@ mod tests {
     use super::*;
     use crate::builtin::Random;
 
-    /// A pair's rows hold its number and in which tick they were made.
+    /// The rows of a pair hold its number and the tick in which they were made.
     #[test]
     fn a_message_is_the_same_whether_its_rows_are_kept_or_made() {
         let mut random = Random::new(8);
         let (mut kept, mut out) = (Kept::default(), Vec::new());
-        // Number of the pair, its rows, when they were made, and where they stand.
+        // Number of the pair, its rows, when they were made, and where they are.
         let mut pairs: Vec<(u64, usize, u64, Span)> = Vec::new();
         for tick in 0..2000 {
             let quiet = random.unit() < 0.3;

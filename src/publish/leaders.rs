@@ -1,29 +1,29 @@
-//! The first of many by some order, kept up as they come and go.
+//! The greatest of a changing set.
 //!
-//! In: what comes and goes. Out: the greatest of what is there. Some of the greatest are kept, and a floor that none of
-//! the others is above: while any of them is left the greatest of all is among them, and only when all have gone must
-//! everything be gone through again.
+//! In: elements that come and go. Out: the greatest of the set. Some of the greatest are kept, with a floor that no
+//! other element exceeds. While any kept one is left, the greatest is among them; only when all are gone must the whole
+//! set be scanned.
 
 use super::events::Ids;
 
-/// So many are kept after what is least of twice as many was let go.
+/// Number of elements kept after the lower half of twice as many was dropped.
 const KEPT: usize = 32;
 
-/// What may be first.
+/// An element of the set.
 pub(super) trait Standing: Copy + Default {
-    /// Whether it is greater than another.
+    /// Returns whether it is greater than another.
     fn is_above(&self, other: &Self) -> bool;
 
-    /// Whose it is.
+    /// The pair that it belongs to.
     fn ids(&self) -> Ids;
 }
 
 /// Some of the greatest.
 #[derive(Clone, Debug)]
 pub(super) struct Leaders<T> {
-    /// In no order; none is below the floor.
+    /// Unordered; none is below the floor.
     kept: Vec<T>,
-    /// Nobody who is not kept is above it; `None`: all are kept.
+    /// No other element is above it; `None`: all are kept.
     floor: Option<T>,
 }
 
@@ -37,17 +37,17 @@ impl<T> Default for Leaders<T> {
 }
 
 impl<T: Standing> Leaders<T> {
-    /// Nobody is there.
+    /// Removes all.
     pub(super) fn clear(&mut self) {
         self.kept.clear();
         self.floor = None;
     }
 
-    /// One comes.
+    /// Adds one.
     pub(super) fn take(&mut self, one: T) {
         let above = match &self.floor {
             None => true,
-            // Of many that are equal some are kept too: else all would be gone through for each.
+            // Some equal ones are kept too: otherwise the set would be scanned for each.
             Some(floor) => one.is_above(floor) || (self.kept.len() < KEPT && !floor.is_above(&one)),
         };
         if !above {
@@ -63,7 +63,7 @@ impl<T: Standing> Leaders<T> {
         self.kept.push(one);
     }
 
-    /// Lets the lower half go.
+    /// Drops the lower half.
     fn raise(&mut self) {
         let greatest_first = |x: &T, y: &T| y.is_above(x).cmp(&x.is_above(y));
         let (_, floor, _) = self.kept.select_nth_unstable_by(KEPT, greatest_first);
@@ -71,7 +71,7 @@ impl<T: Standing> Leaders<T> {
         self.kept.truncate(KEPT);
     }
 
-    /// One that came goes.
+    /// Removes one that was added.
     pub(super) fn leave(&mut self, one: &T) {
         if self.floor.as_ref().is_some_and(|floor| floor.is_above(one)) {
             return;
@@ -81,12 +81,12 @@ impl<T: Standing> Leaders<T> {
         }
     }
 
-    /// Whether the greatest is not known: everything is to be taken again, after [`Leaders::clear`].
+    /// Returns whether the greatest is unknown: all must be added again, after [`Leaders::clear`].
     pub(super) fn are_gone(&self) -> bool {
         self.kept.is_empty() && self.floor.is_some()
     }
 
-    /// The greatest; what is default where nobody is there.
+    /// The greatest; the default if there is none.
     pub(super) fn first(&self) -> T {
         let mut first = None;
         for one in &self.kept {
@@ -135,7 +135,7 @@ mod tests {
             for step in 0..4000 {
                 let leaving = random.unit() < if step / 1000 % 2 == 0 { 0.4 } else { 0.6 };
                 if leaving && !all.is_empty() {
-                    // Mostly one of the greatest.
+                    // Usually one of the greatest.
                     let greatest = (0..all.len()).max_by_key(|at| all[*at].value).unwrap();
                     let any = (random.unit() * all.len() as f64) as usize;
                     let one = all.swap_remove(if random.unit() < 0.7 { greatest } else { any });

@@ -1,11 +1,10 @@
-//! The pairs that are not plainly apart, in the order of their bodies' ids, kept from tick to tick with what the tick
-//! and the messages need of each.
+//! The pairs that are not plainly apart, ordered by their bodies' ids, kept from tick to tick with what the tick and
+//! the messages need of each.
 //!
-//! In: of which pairs there may be something new to say, and which are no more. Out: rows by ids; of a pair that
-//! nothing happened to, the row of the tick before. A sort of all rows would be a sixth of what publishing them takes,
-//! and to ask what is known of every pair most of it.
+//! In: pairs that may have news, and pairs that are gone. Out: rows by ids; for a pair without changes, the row of the
+//! last tick. A sort of all rows would cost a sixth of publishing them, and looking up every pair's data most of it.
 //!
-//! Rows stay where they are once made; what is sorted, and gone through in every tick, are marks of 24 bytes.
+//! Rows stay in place once made; what is sorted, and scanned in every tick, are marks of 24 bytes.
 
 mod validate;
 
@@ -14,7 +13,7 @@ use crate::ids::{BodyId, PairSlot, small};
 use crate::math::Interval;
 use crate::wire::Verdict;
 
-/// A pair: where it stands by ids and by rank.
+/// A pair, with its sort keys by ids and by rank.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row {
     pub(super) ids: (BodyId, BodyId),
@@ -24,11 +23,11 @@ pub(super) struct Row {
     pub(super) best_m: f64,
     /// `None`: the pair is gone.
     pub(super) slot: Option<PairSlot>,
-    /// Place of its event among those that wait; [`NO_EVENT`]: it has none.
+    /// Index of its event among the waiting ones; [`NO_EVENT`]: none.
     pub(super) event: u32,
-    /// How many contact rows it has.
+    /// Number of its contact rows.
     pub(super) contacts: u32,
-    /// What the pair or its way says, whichever is worse.
+    /// Verdict of the pair or of its motion, whichever is worse.
     pub(super) verdict: Verdict,
 }
 
@@ -51,16 +50,16 @@ impl Row {
         }
     }
 
-    /// By what rows are kept where not all fit, the least first: the class, in it the depth as a number in the order
+    /// Sort key for choosing rows if not all fit, the least first: the class, then the depth as a number in the order
     /// of [`f64::total_cmp`].
     pub(super) fn rank(&self) -> (u8, i64) {
         let bits = self.gap.min.to_bits().cast_signed();
-        // Of negative ones all bits but the sign are the other way round.
+        // For negative numbers all bits except the sign are inverted.
         (self.class(), bits ^ ((bits >> 63) & i64::MAX))
     }
 
-    /// Whether it may be taken over from the tick before as it is, unless its pair was stirred. What is undecided ages
-    /// by ticks, and an event is over.
+    /// Returns whether it can be kept unchanged from the last tick, unless its pair was stirred. Undecided rows age by
+    /// ticks, and an event is over after one.
     fn may_last(&self) -> bool {
         self.slot.is_some()
             && self.event == NO_EVENT
@@ -72,20 +71,20 @@ fn order_of(ids: (BodyId, BodyId)) -> u128 {
     u128::from(ids.0.0) << 64 | u128::from(ids.1.0)
 }
 
-/// What is gone through in every tick of a row.
+/// The part of a row that is scanned in every tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
-    /// Place of the row among all; [`NO_ROW`]: it is dropped.
+    /// Index of the row; [`NO_ROW`]: it is dropped.
     row: u32,
-    /// The pair; of no meaning where the row does not last.
+    /// The pair; meaningless if the row does not last.
     slot: PairSlot,
-    /// Where the row stood in the tick before, if it is not fresh.
+    /// Index of the row in the last tick, if it is not fresh.
     pub(super) was: u32,
-    /// Where its contacts stood in `contacts` when they were last filled.
+    /// Where its contacts were in `contacts` when that was last filled.
     pub(super) contacts: Span,
-    /// There is something new to say of it.
+    /// The row has changed.
     pub(super) fresh: bool,
-    /// There is more new to say of it than that it is a tick older.
+    /// More has changed than its age.
     news: bool,
     /// See [`Row::may_last`].
     lasts: bool,
@@ -99,23 +98,23 @@ const _: () = assert!(
 /// No row.
 const NO_ROW: u32 = u32::MAX;
 
-/// The rows, and memory kept over calls.
+/// The rows, and memory kept across calls.
 #[derive(Debug, Default)]
 pub(super) struct Listing {
     /// By ids.
     pub(super) marks: Vec<Mark>,
-    /// In no order, with gaps.
+    /// Unordered, with gaps.
     rows: Vec<Row>,
     gaps: Vec<u32>,
     /// By pair: whether it has a row.
     listed: Vec<bool>,
-    /// Places of marks whose rows are to be looked at again.
+    /// Indices of marks whose rows must be checked again.
     dirty: Vec<u32>,
-    /// Rows that are yet to find their places.
+    /// New rows that are not inserted yet.
     late: Vec<Row>,
     /// There are marks without rows.
     dropped: bool,
-    /// Every active pair has a row, but those that have become so since the last tick.
+    /// Every active pair has a row, except those that became active since the last tick.
     complete: bool,
 }
 
@@ -124,7 +123,7 @@ impl Listing {
         self.marks.len()
     }
 
-    /// The row at a place by ids.
+    /// The row at an index by ids.
     pub(super) fn row(&self, at: usize) -> &Row {
         &self.rows[self.marks[at].row as usize]
     }
@@ -134,34 +133,34 @@ impl Listing {
         self.marks.iter().map(|mark| &self.rows[mark.row as usize])
     }
 
-    /// Where a pair's row is; where it would be.
+    /// Index of a pair's row, or where it would be.
     pub(super) fn find(&self, ids: (BodyId, BodyId)) -> Result<usize, usize> {
         let order = order_of(ids);
         (self.marks).binary_search_by(|mark| self.rows[mark.row as usize].order().cmp(&order))
     }
 
-    /// Places of the rows of which more is new than their age, by ids.
+    /// Indices of the rows in which more has changed than their age, by ids.
     pub(super) fn news(&self) -> impl Iterator<Item = u32> {
         let marks = (0..).zip(&self.marks);
         marks.filter(|(_, mark)| mark.news).map(|(at, _)| at)
     }
 
-    /// Whether a pair has a row.
+    /// Returns whether a pair has a row.
     pub(super) fn has(&self, slot: PairSlot) -> bool {
         self.listed.get(slot.index()) == Some(&true)
     }
 
-    /// Whether every active pair had a row at the end of the last tick, or will have from now on.
+    /// Returns whether every active pair had a row at the end of the last tick; from now on it counts as so.
     pub(super) fn take_complete(&mut self) -> bool {
         std::mem::replace(&mut self.complete, true)
     }
 
-    /// A pair that is active has no row: all of them are to be gone through in the next tick.
+    /// An active pair has no row: all active pairs must be scanned in the next tick.
     pub(super) fn lacks(&mut self) {
         self.complete = false;
     }
 
-    /// Begins a tick: nothing is fresh, and what does not last or is stirred is dirty.
+    /// Begins a tick: nothing is fresh; rows that do not last or are stirred are dirty.
     pub(super) fn begin(&mut self, is_stirred: impl Fn(PairSlot) -> bool) {
         self.dirty.clear();
         for (at, mark) in (0..).zip(&mut self.marks) {
@@ -173,14 +172,14 @@ impl Listing {
         }
     }
 
-    /// Place of the n-th dirty row.
+    /// Index of the n-th dirty row.
     pub(super) fn dirty(&self, n: usize) -> Option<usize> {
         self.dirty.get(n).map(|&at| at as usize)
     }
 
-    /// Puts another row of the same pair in its place.
+    /// Replaces a row by another of the same pair.
     ///
-    /// * `news` - whether more may be new of it than its age.
+    /// * `news` - whether more may have changed than its age.
     pub(super) fn renew(&mut self, at: usize, row: Row, news: bool) {
         let mark = &mut self.marks[at];
         (mark.fresh, mark.lasts) = (true, row.may_last());
@@ -206,17 +205,18 @@ impl Listing {
         self.dropped = true;
     }
 
-    /// Forgets the marks of what was dropped.
+    /// Removes the marks of dropped rows.
     pub(super) fn close(&mut self) {
         if std::mem::take(&mut self.dropped) {
             self.marks.retain(|mark| mark.row != NO_ROW);
         }
-        // How many are dirty differs from tick to tick: room for all of them is made when rows are more than ever.
+        // The number of dirty rows varies from tick to tick: room for all is reserved when there are more rows than
+        // ever.
         self.dirty.clear();
         self.dirty.reserve(self.marks.len());
     }
 
-    /// Takes a row that was not there before; [`Listing::finish`] puts it in its place.
+    /// Adds a new row; [`Listing::finish`] inserts it in order.
     pub(super) fn add(&mut self, row: Row) {
         if let Some(slot) = row.slot {
             if self.listed.len() <= slot.index() {
@@ -227,7 +227,7 @@ impl Listing {
         self.late.push(row);
     }
 
-    /// Puts what was added in its place.
+    /// Inserts the added rows in order.
     pub(super) fn finish(&mut self) {
         let mut late = std::mem::take(&mut self.late);
         late.sort_unstable_by_key(Row::order);
@@ -242,7 +242,7 @@ impl Listing {
             lasts: false,
         };
         self.marks.resize(end + late.len(), hole);
-        // From the end: a place is written after what stood there has been moved on.
+        // From the end: a position is written after its old content has been moved on.
         while let Some(row) = late.pop() {
             let before = late.len();
             let rows = &self.rows;
@@ -267,12 +267,12 @@ impl Listing {
             return at;
         }
         self.rows.push(row);
-        // Room to drop every one of them.
+        // Reserves room to drop every one of them.
         self.gaps.reserve(self.rows.capacity());
         small(self.rows.len() - 1)
     }
 
-    /// Nothing of the last tick holds: every row is made anew.
+    /// Nothing of the last tick is valid: every row is made again.
     pub(super) fn forget(&mut self) {
         self.marks.clear();
         self.rows.clear();
@@ -311,7 +311,7 @@ mod tests {
         }
     }
 
-    /// Each pair by its id: the slot it has, and when its row was made.
+    /// Each pair by its id: its slot, and when its row was made.
     #[test]
     fn rows_are_by_ids_whatever_left_or_came() {
         let (mut listing, mut random) = (Listing::default(), Random::new(3));
@@ -321,7 +321,7 @@ mod tests {
                 listing.forget();
                 pairs.clear();
             }
-            // Some are stirred: of those some are gone, and of these some leave their slots to others.
+            // Some are stirred: some of those are gone, and some of these leave their slots to others.
             let chance = random.unit();
             let stirred: Vec<bool> = (0..90).map(|_| random.unit() < chance).collect();
             let before: Vec<u64> = pairs.iter().map(|pair| pair.0).collect();

@@ -1,4 +1,4 @@
-//! Fills the outbox: what is known after a tick, for those who listen.
+//! Fills the outbox: what is known after a tick, for the messages that have readers.
 //!
 //! In: the world, the pair set's delta, the narrow phase's findings, the demand. Out: `wire::Outbox`, ordered by ids.
 //! Rows that do not fit are left out by rank and counted, and the state is then never `clear`.
@@ -33,11 +33,11 @@ use listing::Listing;
 use owed::Owed;
 use state::Survey;
 
-/// How many pairs ahead of the one at hand what is known of a pair is asked for: a pair takes some 50 ns, memory about
-/// twice as long.
+/// How many pairs ahead the data of a pair are prefetched: a pair takes some 50 ns, a memory access about twice as
+/// long.
 const AHEAD: usize = 8;
 
-/// Which of the messages that are made of kept rows are listened to.
+/// Which of the messages made of kept rows have readers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Heard {
     pairs: bool,
@@ -45,7 +45,7 @@ struct Heard {
     contact_changes: bool,
 }
 
-/// What a tick hands to the publisher.
+/// What a tick passes to the publisher.
 #[derive(Debug)]
 pub struct View<'a> {
     /// Bodies, sources, rejects.
@@ -56,50 +56,50 @@ pub struct View<'a> {
     pub delta: &'a PairDelta,
     /// Findings; contacts get their ids here.
     pub narrow: &'a mut Narrow,
-    /// Who listens.
+    /// Which messages have readers.
     pub demand: Demand,
     /// Random number of this start of the daemon.
     pub boot_id: u64,
     /// Tick.
     pub tick: u64,
-    /// Its time, nanoseconds of `CLOCK_BOOTTIME`.
+    /// Time of the tick, nanoseconds of `CLOCK_BOOTTIME`.
     pub now_ns: u64,
 }
 
-/// Remembers what was certified and sent, and reuses its memory from tick to tick.
+/// Keeps what was certified and sent, and reuses its memory from tick to tick.
 #[derive(Debug)]
 pub struct Publisher {
     limits: Limits,
     events: Events,
-    /// Events of messages that could not be handed over.
+    /// Events of messages that could not be delivered.
     owed: Owed,
     listing: Listing,
     survey: Survey,
-    /// Which were listened to in the last tick.
+    /// Which messages had readers in the last tick.
     heard: Heard,
     kept_pairs: Kept<PairRow>,
-    /// What `changes` build on.
+    /// The base of the next `changes`.
     chain: Chain,
     kept_contacts: Kept<ContactRow>,
-    /// What `contact_changes` build on.
+    /// The base of the next `contact_changes`.
     contact_chain: Chain,
-    /// Used only when not all contacts fit: of the pairs that have some the depth in metres, the place among the rows
-    /// and how many they are.
+    /// Used only when not all contacts fit: for each pair with contacts the depth in metres, the index of its row in
+    /// the list, and its number of contacts.
     contact_pairs: Vec<(f64, u32, u32)>,
-    /// Used only when not all rows fit: by place whether it is sent.
+    /// Used only when not all rows fit: by index whether a row is sent.
     chosen: Vec<bool>,
-    /// Where the rows stood in `pairs` in the last tick.
+    /// Index of each row in `pairs` in the last tick.
     stood: Stood,
     /// Whether `contacts` had all its rows in the last tick.
     had_all_contacts: bool,
-    /// Used only when not all rows fit, or for regions: the rows that one may choose from.
+    /// Used only when not all rows fit, or for regions: the rows to choose from.
     ranked: Vec<Rank>,
     verdicts: Vec<u8>,
     next_contact: u64,
 }
 
 impl Publisher {
-    /// A publisher that keeps to these limits.
+    /// A publisher with these limits.
     #[must_use]
     pub fn new(limits: Limits) -> Self {
         Self {
@@ -123,9 +123,9 @@ impl Publisher {
         }
     }
 
-    /// The pair set is built anew: what is remembered goes on by body ids.
+    /// The pair set was rebuilt: remembered data carry over by body ids.
     ///
-    /// * `last` - the last tick, which `world` is still that of.
+    /// * `last` - the last tick, which `world` still shows.
     pub fn forget_slots(&mut self, last: u64, world: &World) {
         self.events.forget_slots(last, world);
         self.listing.forget_slots();
@@ -133,7 +133,7 @@ impl Publisher {
         self.survey.forget();
     }
 
-    /// Nothing of the last tick holds: every row is made anew.
+    /// Nothing of the last tick is valid: every row is made again.
     pub(crate) fn forget_rows(&mut self) {
         self.listing.forget();
         self.break_chains();
@@ -145,13 +145,13 @@ impl Publisher {
         self.contact_chain.break_off();
     }
 
-    /// Fills every message that is listened to, then the tick's own counts, state and reasons.
+    /// Fills every message that has readers, then the tick's own counts, state and reasons.
     ///
-    /// * `out` - as the last call left it: rows that still hold are not made again.
+    /// * `out` - as the last call left it: rows that are still valid are not made again.
     pub fn fill(&mut self, view: &mut View<'_>, out: &mut Outbox) {
         let header = Self::header(view);
         self.review(view);
-        // Before the pairs, which leave out of the list what does not fit.
+        // Before the pairs: filling these leaves rows that do not fit out of the list.
         let contacts_left = self.fill_contacts(view, header, out);
         let regions_left = self.fill_regions(view, header, out);
         let pairs_left = self.fill_list(view, header, out);

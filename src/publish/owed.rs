@@ -1,15 +1,15 @@
-//! Events that were told in a message which could not be handed over: they are owed to those who read it.
+//! Events in a message that could not be delivered: they are owed to the readers of that message.
 //!
-//! In: the events of the last tick, and which of its messages reached nobody. Out: rows of the next tick for those who
-//! lack them, each event once and in its order. Whom the message did reach (ROS 2, a recording, who reads the other
-//! one) has them already: `pairs` itself stays as it is, so that a replay, which loses nothing, says the same.
+//! In: the events of the last tick, and which of its messages were not delivered. Out: rows of the next tick for
+//! readers that lack them, each event once and in order. Other readers (ROS 2, a recording, readers of the other
+//! message) have them already: `pairs` itself stays unchanged, so that a replay, which loses nothing, says the same.
 
 use super::events::{Ids, PairEvent};
 use super::listing::{NO_EVENT, Row};
 use super::{Publisher, View};
 use crate::wire::{Outbox, PairRow, Undelivered};
 
-/// Events that are owed to the readers of a message at most, where fewer rows fit into one.
+/// Most events owed to the readers of a message, if fewer rows fit into one.
 const OWED_MAX: usize = 1 << 16;
 
 /// What is owed to the readers of each message.
@@ -20,7 +20,7 @@ pub(super) struct Owed {
 }
 
 impl Owed {
-    /// Begins and their ends that were never sent to the readers of the message that lost more of them.
+    /// Begins, with their ends, that were never sent; of the two messages, the higher count.
     pub(super) fn cancelled(&self) -> u64 {
         self.pairs.cancelled.max(self.changes.cancelled)
     }
@@ -29,9 +29,9 @@ impl Owed {
 /// What is owed to the readers of one message.
 #[derive(Debug, Default)]
 pub(super) struct Debt {
-    /// By ids, one entry a pair.
+    /// By ids, one entry per pair.
     owed: Vec<PairEvent>,
-    /// Of each of these, whether it is in the message of this tick.
+    /// By entry of `owed`: whether it is in the message of this tick.
     sent: Vec<bool>,
     cancelled: u64,
 }
@@ -41,7 +41,7 @@ impl Debt {
         self.owed.is_empty()
     }
 
-    /// Nobody reads the message any more; who begins to sees the full state.
+    /// The message has no readers any more; new ones get the full state.
     fn forget(&mut self) {
         self.owed.clear();
         self.sent.clear();
@@ -57,9 +57,9 @@ impl Debt {
         self.owed.binary_search_by_key(&ids, |owed| owed.ids).ok()
     }
 
-    /// A pair's event with what is owed of it in front, which goes out with it.
+    /// A pair's event preceded by what is owed for it; both are sent together.
     ///
-    /// * returns - `None`: nothing is owed of this pair.
+    /// * returns - `None`: nothing is owed for this pair.
     pub(super) fn take(&mut self, ids: Ids, now: Option<&PairEvent>) -> Option<PairEvent> {
         if self.owed.is_empty() {
             return None;
@@ -73,11 +73,10 @@ impl Debt {
         Some(event)
     }
 
-    /// Ends a tick: what its message told is settled where that was handed over, and owed as well where it was not.
+    /// Ends a tick: events in its message are settled if it was delivered, and otherwise owed too.
     ///
     /// * `told` - the events of the tick.
-    /// * `most` - how many entries there may be. Beyond it passes cancel, as a begin and its end do, and then what else
-    ///   is owed.
+    /// * `most` - most entries. Beyond it passes cancel, as a begin with its end, and then other owed events.
     pub(super) fn settle(&mut self, lost: bool, told: &[PairEvent], most: usize) {
         if !lost && self.owed.is_empty() {
             return;
@@ -101,8 +100,8 @@ impl Debt {
         if self.owed.len() > most {
             let had = self.owed.len();
             self.owed.retain(|owed| !owed.is_pass_alone());
-            // A list that is cut has no room for pairs that are not in it: for as long as that lasts they may be any
-            // number, of bodies that come and go.
+            // A list that is cut off has no room for unlisted pairs: meanwhile their number may grow without limit,
+            // with bodies that come and go.
             self.owed.truncate(most.max(OWED_MAX));
             self.cancelled += (had - self.owed.len()) as u64;
         }
@@ -112,7 +111,7 @@ impl Debt {
     /// Structure check, between two ticks.
     ///
     /// # Errors
-    /// One sentence on the first thing that does not hold.
+    /// One sentence on the first check that fails.
     pub(super) fn validate(&self) -> Result<(), String> {
         if !(self.owed).is_sorted_by(|one, next| one.ids < next.ids) {
             return Err("events that are owed are not by ids, one a pair".into());
@@ -125,15 +124,15 @@ impl Debt {
 }
 
 impl Publisher {
-    /// Takes which of the last tick's messages could not be handed over.
+    /// Takes which of the last tick's messages could not be delivered.
     pub fn note_undelivered(&mut self, unsent: Undelivered) {
         let (told, most) = (self.events.told(), self.limits.pair_rows);
         self.owed.pairs.settle(unsent.pairs, told, most);
         self.owed.changes.settle(unsent.changes, told, most);
     }
 
-    /// Fills `owed`, behind `pairs`. A pair that is not listed gets a row of its own where `pairs` has room for it; its
-    /// event waits where not.
+    /// Fills `owed`, after `pairs`. A pair that is not listed gets its own row if `pairs` has room for it; otherwise
+    /// its event waits.
     pub(super) fn fill_owed(&mut self, view: &mut View<'_>, out: &mut Outbox) {
         out.owed.clear();
         out.owed_cancelled = self.owed.cancelled();
@@ -159,10 +158,9 @@ impl Publisher {
         self.owed.pairs = debt;
     }
 
-    /// Has the pairs of which something is owed, and which are not listed, be told in `changes` where there is room for
-    /// them.
+    /// Adds pairs that are owed something and are not listed to `changes`, if there is room for them.
     ///
-    /// * `places` - how many rows of the list are sent.
+    /// * `places` - rows of the list that are sent.
     pub(super) fn owed_of_unlisted(&mut self, places: usize) {
         let room = self.limits.pair_rows.saturating_sub(places);
         let (listing, chain) = (&self.listing, &mut self.chain);
@@ -171,7 +169,7 @@ impl Publisher {
         chain.dropped.extend(unlisted.take(room));
     }
 
-    /// Begins what is owed in `changes`; whether that is something.
+    /// Begins the owed part of `changes`; returns whether there is any.
     pub(super) fn begin_owed_changes(&mut self, is_read: bool) -> bool {
         if !is_read {
             self.owed.changes.forget();
@@ -180,14 +178,14 @@ impl Publisher {
         !self.owed.changes.is_empty()
     }
 
-    /// The row of a pair for those to whom something of it may be owed.
+    /// The row of a pair for readers to whom something may be owed.
     pub(super) fn owed_row(&self, view: &View<'_>, row: &Row, debt: &mut Debt) -> PairRow {
         let now = self.events.waiting().get(row.event as usize);
         let owed = debt.take(row.ids, now);
         self.pair_row_with(view, row, owed.as_ref().or(now))
     }
 
-    /// Whether the row at a place is among those that fit.
+    /// Returns whether the row at an index is among those that fit.
     fn is_sent(&self, at: usize) -> bool {
         let cut = self.listing.len() > self.limits.pair_rows;
         !cut || self.chosen.get(at) == Some(&true)

@@ -1,4 +1,4 @@
-//! The list of pairs: every one that is not plainly apart, and every event. Rows of `pairs` are all of it.
+//! The list of pairs: every one that is not plainly apart, and every event. Rows of `pairs` contain all of it.
 
 use crate::ids::{PairKey, PairSlot, small};
 use crate::math::{Interval, Point};
@@ -14,7 +14,7 @@ use super::kept::{Kept, Span};
 use super::listing::{Mark, NO_EVENT, Row};
 use super::{AHEAD, Publisher, View};
 
-/// A verdict, or what a way that is news says, whichever is worse.
+/// The worse of a verdict and the result of a motion that is news.
 pub(super) fn worst_of(verdict: Verdict, passage: Option<Passage>) -> Verdict {
     match passage {
         Some(Passage::Touched(_)) => Verdict::Colliding,
@@ -41,7 +41,7 @@ impl Publisher {
         self.fill_pairs(view, header, left_out, out);
         self.fill_owed(view, out);
         self.fill_changes(view, header, left_out, out);
-        // Who begins to listen later sees the full state; there is nobody to tell what happened before.
+        // Readers that start later get the full state; no reader needs what happened before.
         let (listing, chosen, cut) = (&self.listing, &self.chosen, left_out > 0);
         let is_left_out = |ids| {
             listing
@@ -104,7 +104,7 @@ impl Publisher {
         };
     }
 
-    /// Keeps the rows that are not fresh and stood side by side, from a place on; returns the place behind them.
+    /// Keeps the rows that are not fresh and were adjacent, from an index on; returns the index after them.
     fn keep_pairs(&self, from: usize, kept: &mut Kept<PairRow>, out: &mut [PairRow]) -> usize {
         let marks = &self.listing.marks[from..];
         let first = marks.first().map_or(0, |mark| mark.was);
@@ -121,7 +121,7 @@ impl Publisher {
         from + count
     }
 
-    /// Gives the listed pairs their events, and lists those that are not active any more.
+    /// Gives the listed pairs their events, and lists pairs with events that are no longer active.
     fn add_events(&mut self, view: &mut View<'_>) {
         let (events, listing) = (&self.events, &mut self.listing);
         for (at, event) in events.waiting().iter().enumerate() {
@@ -137,7 +137,7 @@ impl Publisher {
     /// The row of a pair that is plainly apart, or gone.
     pub(super) fn row_of_apart(view: &mut View<'_>, ids: Ids, event: u32) -> Row {
         let slot = Self::slot_of(view, ids);
-        // Its certificate may hold, and its interval still be that of older poses.
+        // Its certificate may still hold while its interval is that of older poses.
         if let Some(slot) = slot {
             view.narrow.bring_up(slot, view.world);
         }
@@ -199,7 +199,7 @@ impl Publisher {
             }
             if let Some(ticks) = event.pass {
                 out.events |= Event::End.bit() | Event::Passed.bit();
-                // An end before it that found no room is told with its own: from its first tick on.
+                // An earlier end that did not fit is merged with this one: its range starts at the earlier first tick.
                 let first = event.end.map_or(ticks.last, |(end, _)| end.first);
                 out.end_cause = EndCause::Separated.code();
                 (out.end_first_tick, out.end_last_tick) = (first, ticks.last);
@@ -230,7 +230,7 @@ impl Publisher {
         out.bound_age_ticks =
             u32::try_from(view.tick - finding.tested.max(finding.born)).unwrap_or(u32::MAX);
         if let Some(witness) = finding.witness {
-            // An estimate is never outside what is proved.
+            // An estimate is never outside the proven interval.
             out.gap_best_m = witness.best_m.max(finding.gap.min).min(finding.gap.max);
             if goes_as_told(a)
                 && goes_as_told(b)
@@ -255,7 +255,7 @@ impl Publisher {
         }
     }
 
-    /// What is known of the way to this tick's poses.
+    /// Adds what is known about the motion to this tick's poses.
     fn describe_way(&self, view: &View<'_>, slot: PairSlot, out: &mut PairRow) {
         let Some(swept) = view.narrow.passage(slot) else {
             return;
@@ -263,10 +263,10 @@ impl Publisher {
         if swept.teleported {
             out.flags |= pair_flags::TELEPORTED;
         }
-        // Who collides now has touched by now.
+        // A pair that collides now must have touched by now.
         let colliding = out.verdict == Verdict::Colliding.code();
         let toi = match swept.passage {
-            // What jumped there was not swept.
+            // A body that jumped was not swept.
             Passage::Free if colliding && !swept.jumped => {
                 Passage::Touched(Interval { min: 1.0, max: 1.0 })
             }
@@ -291,15 +291,15 @@ impl Publisher {
     }
 }
 
-/// Whether a body goes as its sender says: of one that is silent or refused that is long ago.
+/// Returns whether a body moves as its sender reports: for a silent or refused one the report is old.
 fn goes_as_told(tag: &Tag) -> bool {
     tag.has_velocity && matches!(tag.status, BodyStatus::Known | BodyStatus::Truncated)
 }
 
-/// How fast the gap shrinks at the witness of two bodies whose velocities are known, metres a second.
+/// How fast the gap shrinks at the witness of two bodies with known velocities, metres per second.
 fn closing_speed(a: &Body, b: &Body, witness: &Witness) -> f64 {
     let velocity_at = |body: &Body, point: Point| {
-        // Who cannot move has none.
+        // A body that cannot move has no velocity.
         body.twist_at(&point).unwrap_or_default().linear_mps
     };
     let relative = velocity_at(b, witness.point_b) - velocity_at(a, witness.point_a);

@@ -1,4 +1,4 @@
-//! Rows of `regions`: where pairs that touch, or may, do so.
+//! Rows of `regions`: where pairs touch, or may touch.
 
 use crate::limits::{REGION_LOOKS_FREE, REGION_LOOKS_PER_TICK, REGIONS_PER_PAIR_MAX};
 use crate::math::ROUND;
@@ -8,12 +8,12 @@ use crate::world::Body;
 
 use super::{Publisher, View};
 
-/// The last class of rows that have regions: colliding, then possible.
+/// The last class of rows with regions: colliding, then possible.
 const CLASS_MAX: u8 = 2;
 
 impl Publisher {
-    /// Fills `regions` with what the budget has made of them, or what a few looks tell; returns how many rows did not
-    /// fit, one for each pair left out. Whole pairs are kept: colliding ones first, the deepest first.
+    /// Fills `regions` with what the budget allowed, or with the result of a few looks; returns how many rows did not
+    /// fit, one for each pair left out. Whole pairs are kept: colliding ones first, deepest first.
     pub(super) fn fill_regions(
         &mut self,
         view: &mut View<'_>,
@@ -45,7 +45,7 @@ impl Publisher {
                 break;
             }
             if nth == sorted {
-                // No more than may be asked for are put in order.
+                // Sorts no more than may be sent.
                 let behind = &mut chosen[nth..];
                 let next = most.min(behind.len());
                 if next < behind.len() {
@@ -105,7 +105,7 @@ fn row(a: &Body, b: &Body, region: &Region) -> RegionRow {
         body_a: a.id.0,
         body_b: b.id.0,
         centre: centre.coords.into(),
-        // What is lost far from the origin of the scene.
+        // Precision lost far from the origin of the scene.
         radius_m: region.radius_m + 16.0 * ROUND * centre.coords.norm(),
         cone_axis: (turn * region.axis).into(),
         cone_half_angle_rad: region.half_angle_rad,

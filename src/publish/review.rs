@@ -1,7 +1,7 @@
-//! The review: what is new of the active pairs, for the events, the tick's counts and the rows.
+//! The review: what is new about the active pairs, for the events, the tick's counts and the rows.
 //!
-//! In: the rows of the last tick, the narrow phase's findings. Out: the rows of this one. A pair that nothing happened
-//! to since its row was made is not asked about, and its row not read.
+//! In: the rows of the last tick, the narrow phase's findings. Out: the rows of this one. For a pair without changes
+//! since its row was made, neither its finding nor its row is read.
 
 use crate::ids::PairSlot;
 use crate::narrow::{Finding, Narrow, Passage};
@@ -15,7 +15,7 @@ use super::pairs::worst_of;
 use super::{AHEAD, Heard, Publisher, View};
 
 impl Publisher {
-    /// Brings the rows up to this tick.
+    /// Updates the rows to this tick.
     pub(super) fn review(&mut self, view: &mut View<'_>) {
         self.survey.begin();
         self.events
@@ -29,7 +29,7 @@ impl Publisher {
             contact_changes: view.demand.contact_changes,
         };
         if std::mem::replace(&mut self.heard, heard) != heard {
-            // What nobody listened to was not made.
+            // What had no readers was not made.
             self.forget_rows();
         }
         self.renew_rows(view);
@@ -40,7 +40,7 @@ impl Publisher {
         self.survey.look_again(self.listing.iter());
     }
 
-    /// Of the rows of the last tick, those that still are.
+    /// Renews the rows of the last tick whose pairs are still listed.
     fn renew_rows(&mut self, view: &mut View<'_>) {
         self.listing.begin(|slot| view.narrow.is_stirred(slot));
         self.chain.begin();
@@ -54,7 +54,7 @@ impl Publisher {
             n += 1;
             let was = *self.listing.row(at);
             self.survey.leave(&was);
-            // An event is told once: without it the row is another.
+            // An event is sent once: without it the row is different.
             let stirred = was.slot.is_none_or(|slot| view.narrow.is_stirred(slot));
             let news = stirred || was.event != NO_EVENT;
             let now = was.slot.and_then(|slot| self.look(view, slot));
@@ -83,7 +83,7 @@ impl Publisher {
         self.listing.close();
     }
 
-    /// Takes down what was found since the last tick's messages went out, at the poses of that tick.
+    /// Takes results found after the last tick's messages were sent, at the poses of that tick.
     pub fn note_late(&mut self, tick: u64, world: &World, narrow: &Narrow) {
         for &slot in narrow.late() {
             if let Some(finding) = narrow.finding(slot)
@@ -97,7 +97,7 @@ impl Publisher {
         }
     }
 
-    /// Rows of pairs that are active and have none.
+    /// Makes rows for active pairs without one.
     fn find_rows(&mut self, view: &mut View<'_>) {
         let those: fn(&Narrow) -> &[PairSlot] = if self.listing.take_complete() {
             Narrow::entered
@@ -124,7 +124,7 @@ impl Publisher {
         view.narrow.clear_entered();
     }
 
-    /// Takes down what is known of a pair; `None`: it is plainly apart, or gone.
+    /// Takes what is known about a pair; `None`: it is plainly apart, or gone.
     fn look(&mut self, view: &mut View<'_>, slot: PairSlot) -> Option<Row> {
         let finding = view.narrow.finding(slot);
         let finding = finding.filter(|finding| finding.verdict != Verdict::Apart)?;
@@ -140,7 +140,7 @@ impl Publisher {
         Some(row)
     }
 
-    /// As [`Publisher::look`], of pairs that are apart and not active, but may have touched on the way.
+    /// As [`Publisher::look`], for pairs that are apart and not active, but may have touched during the motion.
     fn review_ways(&mut self, view: &View<'_>) {
         for swept in view.narrow.swept() {
             let finding = view.narrow.finding(swept.slot);
@@ -164,7 +164,7 @@ impl Publisher {
 
 /// The row of a pair.
 ///
-/// * `passage` - what its way says, where that is news.
+/// * `passage` - result of its motion, if that is news.
 fn row_of(
     view: &View<'_>,
     slot: PairSlot,

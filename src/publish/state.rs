@@ -1,4 +1,4 @@
-//! The tick in one word, its reasons, its counts, and the worst pair.
+//! The tick's state, its reasons, its counts, and the worst pair.
 
 use crate::ids::BodySlot;
 use crate::narrow::Passage;
@@ -11,11 +11,11 @@ use super::leaders::{Leaders, Standing};
 use super::listing::Row;
 use super::{Publisher, View};
 
-/// A pair that a person should look at first. Default: none.
+/// The pair that a person should look at first. Default: none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Worst {
     ids: Ids,
-    /// `Verdict` code, then depth: the order of worseness.
+    /// `Verdict` code, then depth: sorts by severity.
     rank: (u8, f64),
 }
 
@@ -41,7 +41,7 @@ impl Standing for Worst {
     }
 }
 
-/// How wide the interval of a pair is.
+/// Width of a pair's interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Width {
     ids: Ids,
@@ -68,7 +68,7 @@ impl Standing for Width {
 }
 
 impl Publisher {
-    /// Fills the tick's counts, state, reasons and sources; times and units are the engine's to fill.
+    /// Fills the tick's counts, state, reasons and sources; the engine fills times and units.
     pub(super) fn fill_tick(
         &self,
         view: &View<'_>,
@@ -146,7 +146,7 @@ impl Publisher {
     }
 }
 
-/// Has every message say of the tick what all say, and its state.
+/// Copies the common header and the state into every message.
 fn repeat(header: MessageHeader, state: State, out: &mut Outbox) {
     for message in [
         &mut out.pairs_header,
@@ -164,17 +164,17 @@ fn repeat(header: MessageHeader, state: State, out: &mut Outbox) {
     }
 }
 
-/// What the rows say for the tick, kept up as they come and go.
+/// Totals over the rows, updated as they come and go.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Survey {
     worst: Leaders<Worst>,
     widest: Leaders<Width>,
-    /// For how many ticks the oldest undecided pair has been so.
+    /// Age in ticks of the oldest undecided pair.
     oldest_ticks: u64,
-    /// Pairs that touched on their way, and those that may have.
+    /// Pairs that touched during their motion, and those that may have.
     touched: u64,
     open: u64,
-    /// Contacts of all rows.
+    /// Number of contacts of all rows.
     contacts: usize,
 }
 
@@ -184,21 +184,21 @@ impl Survey {
         (self.oldest_ticks, self.touched, self.open) = (0, 0, 0);
     }
 
-    /// Forgets all rows.
+    /// Clears all rows.
     pub(super) fn forget(&mut self) {
         self.worst.clear();
         self.widest.clear();
         (self.contacts, self.touched, self.open) = (0, 0, 0);
     }
 
-    /// A row of the last tick goes, or is about to be taken anew.
+    /// Removes a row of the last tick, which goes or is renewed.
     pub(super) fn leave(&mut self, row: &Row) {
         self.contacts -= row.contacts as usize;
         self.worst.leave(&Worst::of(row));
         self.widest.leave(&Width::of(row));
     }
 
-    /// Looks for the worst pairs and the widest intervals anew, if those that were known are gone.
+    /// Searches the worst pairs and the widest intervals again, if the known ones are gone.
     pub(super) fn look_again<'a>(&mut self, rows: impl Iterator<Item = &'a Row>) {
         if self.worst.are_gone() || self.widest.are_gone() {
             self.worst.clear();
@@ -207,10 +207,10 @@ impl Survey {
         }
     }
 
-    /// Takes the row of an active pair, or of one whose way is news. A row that stands for an event alone has nothing
-    /// to survey.
+    /// Adds the row of an active pair, or of one whose motion is news. Rows that exist only for an event are not
+    /// surveyed.
     ///
-    /// * `passage` - what its way says, where that is news.
+    /// * `passage` - result of its motion, if that is news.
     pub(super) fn take(&mut self, row: &Row, passage: Option<Passage>) {
         match passage {
             Some(Passage::Touched(_)) => self.touched += 1,
@@ -226,21 +226,21 @@ impl Survey {
         self.widest.take(Width::of(row));
     }
 
-    /// How many contacts the pairs have.
+    /// Number of contacts of the pairs.
     pub(super) fn contacts(&self) -> usize {
         self.contacts
     }
 
-    /// Structure check, between two ticks: what is kept up is what all rows say.
+    /// Structure check, between two ticks: compares the totals with all rows.
     ///
     /// # Errors
-    /// What is not.
+    /// The first difference.
     pub(super) fn validate<'a>(&self, rows: impl Iterator<Item = &'a Row>) -> Result<(), String> {
         let (mut contacts, mut worst, mut widest_m) = (0, Worst::default(), 0.0_f64);
         for row in rows {
             contacts += row.contacts as usize;
             widest_m = widest_m.max(row.gap.width());
-            // One that is there for its event alone, or for what was on its way, is no active pair.
+            // A row that exists only for its event, or for its motion, is no active pair.
             let one = Worst::of(row);
             if row.verdict != Verdict::Apart && one.is_above(&worst) {
                 worst = one;

@@ -1,5 +1,5 @@
-//! Checks the whole structure of what is kept from tick to tick to publish from: the list of pairs, the events, and
-//! that the messages of the last tick are what rows and marks say of them.
+//! Checks all data kept from tick to tick for publishing: the list of pairs, the events, and that the messages of the
+//! last tick agree with rows and marks.
 
 use super::Publisher;
 use super::fit::Stood;
@@ -12,10 +12,10 @@ use crate::world::World;
 impl Publisher {
     /// Structure check, between two ticks.
     ///
-    /// * `tick` - the last one, which `world`, `pairs`, `narrow` and `out` are those of.
+    /// * `tick` - the last one; `world`, `pairs`, `narrow` and `out` belong to it.
     ///
     /// # Errors
-    /// One sentence on the first thing that does not hold.
+    /// One sentence on the first check that fails.
     pub fn validate(
         &self,
         tick: u64,
@@ -30,7 +30,7 @@ impl Publisher {
         self.survey.validate(self.listing.iter())?;
         self.chain.validate(tick)?;
         self.contact_chain.validate(tick)?;
-        // Of rows that were forgotten the messages tell still.
+        // The messages still contain rows that were forgotten.
         if !self.listing.is_complete() {
             return Ok(());
         }
@@ -38,7 +38,7 @@ impl Publisher {
         self.validate_contacts(out)
     }
 
-    /// Rows that go on as they are say what is known, and no active pair is without one.
+    /// Checks that rows kept unchanged agree with the findings, and that every active pair has one.
     fn validate_rows(&self, narrow: &Narrow) -> Result<(), String> {
         for row in self.listing.iter() {
             let Some(slot) = row.slot.filter(|slot| !narrow.is_stirred(*slot)) else {
@@ -46,7 +46,7 @@ impl Publisher {
             };
             let passage = narrow.passage(slot).map(|swept| swept.passage);
             let known = narrow.finding(slot).map(|finding| finding.verdict);
-            // A way counts where it is news.
+            // A motion counts only if it is news.
             let verdicts = [known, known.map(|verdict| worst_of(verdict, passage))];
             if !verdicts.contains(&Some(row.verdict)) {
                 return Err(format!(
@@ -66,7 +66,7 @@ impl Publisher {
         }
     }
 
-    /// `pairs` is by ids, and has a row for each of the list where all fit.
+    /// Checks that `pairs` is ordered by ids, and has a row for each of the list if all fit.
     fn validate_pairs(&self, out: &Outbox) -> Result<(), String> {
         if !self.heard.pairs {
             return Ok(());
@@ -89,7 +89,7 @@ impl Publisher {
         Ok(())
     }
 
-    /// `contacts` are those of the list's rows, side by side where their marks say.
+    /// Checks that `contacts` are those of the list's rows, adjacent at the positions in their marks.
     fn validate_contacts(&self, out: &Outbox) -> Result<(), String> {
         if !self.heard.contacts {
             return Ok(());

@@ -1,13 +1,13 @@
-//! Who has listened lately: what the plan says of readers.
+//! Which messages had readers recently: input of the plan.
 
 use crate::plan::Readers;
 use crate::wire::Demand;
 
-/// Ticks for which nobody must have read a message before the plan says so: a reader that comes back does not make the
-/// plan go to and fro.
+/// Ticks without a reader of a message before the plan drops it: a reader that comes back does not make the plan switch
+/// back and forth.
 const QUIET_TICKS: u32 = 64;
 
-/// Ticks since somebody listened, of each thing that is computed for readers.
+/// Ticks since the last reader, for each result that is computed for readers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Audience {
     bounds: u32,
@@ -26,7 +26,7 @@ impl Default for Audience {
 }
 
 impl Audience {
-    /// Notes who listens to this tick; what somebody has read lately.
+    /// Records the demand of this tick; returns what had readers recently.
     pub(super) fn note(&mut self, now: Demand) -> Readers {
         let whole = now.tells_contacts() || now.regions;
         Readers {
@@ -70,7 +70,7 @@ mod tests {
         for tick in 1..64 {
             assert_eq!(audience.note(reads(false, true)), both, "tick {tick}");
         }
-        // The reader of pairs is away from here on: this is its first tick.
+        // The reader of pairs is away from here on: this is its first tick away.
         let pairs = Readers {
             bounds: true,
             ..nobody
@@ -81,7 +81,7 @@ mod tests {
         }
         assert_eq!(audience.note(reads(false, false)), nobody);
         assert_eq!(audience.note(reads(false, false)), nobody);
-        // One that looks in begins the count anew.
+        // A short visit restarts the count.
         assert_eq!(audience.note(reads(false, true)), pairs);
         for tick in 1..64 {
             assert_eq!(audience.note(reads(false, false)), pairs, "tick {tick}");

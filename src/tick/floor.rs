@@ -1,4 +1,4 @@
-//! What a tick cannot cut, measured: admission, broad phase, widening, publishing, sending.
+//! The fixed costs of a tick, measured: admission, broad phase, widening, publishing, sending.
 
 use std::sync::Arc;
 
@@ -11,13 +11,13 @@ pub(super) struct Laps {
     woke_ns: u64,
     last_ns: u64,
     stage_ns: [u64; STAGES_LEN],
-    /// CPU time of this thread at the end of the narrow phase, and what publishing took of it.
+    /// CPU time of this thread at the end of the narrow phase, and the CPU time of publishing.
     narrowed_cpu_ns: u64,
     publish_cpu_ns: u64,
 }
 
 impl Laps {
-    /// Starts at the moment the daemon woke.
+    /// Starts at the time when the daemon woke.
     pub(super) fn start(clock: Arc<dyn Clock>, woke_ns: u64) -> Self {
         let last_ns = clock.monotonic_ns();
         Self {
@@ -62,7 +62,7 @@ impl Laps {
     }
 }
 
-/// When work that is to end in time began, on the wall and by the thread's CPU clock.
+/// When timed work began, by the wall clock and by the thread's CPU clock.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Began {
     wall_ns: u64,
@@ -81,13 +81,13 @@ impl Began {
         self.wall_ns
     }
 
-    /// What was left until a moment when it began.
+    /// Time left until `end_ns` when it began.
     pub(super) fn left_ns(&self, end_ns: u64) -> u64 {
         end_ns.saturating_sub(self.wall_ns)
     }
 
-    /// By how much this thread has passed a deadline: what was late before it began is not its doing, and what others
-    /// had of its core neither.
+    /// By how much this thread has passed a deadline, not counting lateness from before it began and time that other
+    /// threads used its core.
     pub(super) fn passed_ns(&self, deadline_ns: u64, clock: &dyn Clock) -> u64 {
         let now_ns = clock.monotonic_ns();
         let late_ns = now_ns.saturating_sub(deadline_ns.max(self.wall_ns));
@@ -99,15 +99,15 @@ impl Began {
     }
 }
 
-/// What publishing and sending will take, learned from the ticks before.
+/// Expected duration of publishing and sending, learned from earlier ticks.
 ///
-/// Publishing is taken by the thread's CPU clock: a slice that the scheduler gave to others says nothing about the next
-/// tick. How long it takes varies by a fifth from tick to tick with what is in the caches, so a mean would be too short
-/// every other tick. What is kept back is a decaying maximum, and where the budget leaves more, up to the longest of
-/// the windows and a quarter of that, for three quarters of what it leaves: a safety that a small budget could not pay.
+/// Publishing is measured by the thread's CPU clock: a slice that the scheduler gave to others does not predict the
+/// next tick. Its duration varies by a fifth from tick to tick with the state of the caches, so a mean would be too
+/// short every other tick. The reserve is a decaying maximum. If the budget allows, it is increased up to the longest
+/// time of the windows plus a quarter, using at most three quarters of the time left: a safety that a small budget
+/// cannot afford.
 ///
-/// With it counts by how much the narrow phase passed its deadline: the query that was under way then, and closing the
-/// work lists.
+/// The overrun of the narrow phase is added: the query in progress at its deadline, and closing the work lists.
 #[derive(Clone, Debug)]
 pub(super) struct Floor {
     /// CPU time of the last endings, nanoseconds, the oldest overwritten first.
@@ -115,7 +115,7 @@ pub(super) struct Floor {
     ticks: usize,
     /// Decaying maximum.
     recent_ns: u64,
-    /// Median of the window, and maxima of the last windows, that under way first.
+    /// Median of the window, and maxima of the last windows, the current one first.
     median_ns: u64,
     maxima_ns: [u64; WINDOWS],
     /// By how much the narrow phase passed its deadline in this tick.
@@ -124,22 +124,22 @@ pub(super) struct Floor {
     last_send_ns: u64,
 }
 
-/// Endings remembered one by one: a window.
+/// Number of endings remembered one by one: a window.
 const WINDOW: usize = 128;
-/// Windows of which the longest ending is remembered: that of a single one is exceeded in about one tick in a hundred.
-/// With more, more is kept back for longer after a spike.
+/// Number of windows whose longest ending is remembered: that of a single one is exceeded in about one tick in a
+/// hundred. With more, more is reserved for longer after a spike.
 const WINDOWS: usize = 4;
-/// Ticks after which the median is looked for again.
+/// Ticks after which the median is computed again.
 const MEDIAN_TICKS: usize = 16;
 /// Each tick the decaying maximum loses 1 / 32 of itself: a spike is forgotten in about 80 ticks. Faster (1 / 8), and
-/// one tick in a hundred ended 0.1 to 0.5 ms late; slower, and more of the budget is kept back than publishing takes.
+/// one tick in a hundred ended 0.1 to 0.5 ms late; slower, and more is reserved than publishing takes.
 const DECAY_SHIFT: u32 = 5;
-/// Of what is left above the floor, three quarters may be kept back beyond the median of publishing. In a pool of 4,000
-/// bodies, 100 and 250 us above the floor, one tick in a hundred ended 43 to 93 us late with a half, 38 to 73 with two
-/// thirds, 26 to 58 with four fifths; and the more is kept back, the more answers come a tick later. What is kept back
-/// for nothing is used after publishing.
+/// Up to three quarters of the time left above the floor may be reserved beyond the median of publishing. In a pool of
+/// 4,000 bodies, 100 and 250 us above the floor, one tick in a hundred ended 43 to 93 us late with a half, 38 to 73
+/// with two thirds, 26 to 58 with four fifths; and the more is reserved, the more answers come a tick later. Unused
+/// reserve is spent after publishing.
 const SAFETY_QUARTERS: u64 = 3;
-/// Kept back beside it, nanoseconds: what each of the two takes on the wall alone.
+/// Additional reserve, nanoseconds: wall time of the two beyond their CPU time.
 const CLOSING_NS: u64 = 10_000;
 
 impl Default for Floor {
@@ -158,7 +158,7 @@ impl Default for Floor {
 }
 
 impl Floor {
-    /// Time to keep back for publishing and sending, of `left_ns` until the tick's end.
+    /// Time to reserve for publishing and sending, out of `left_ns` until the tick's end.
     pub(super) fn reserve_ns(&self, left_ns: u64) -> u64 {
         let certain_ns = self.recent_ns + self.send_ns + CLOSING_NS;
         let rest_ns = left_ns.saturating_sub(self.usual_ns() + CLOSING_NS);
@@ -183,7 +183,7 @@ impl Floor {
         self.late_ns = late_ns;
     }
 
-    /// What publishing and sending mostly take.
+    /// Usual duration of publishing and sending.
     pub(super) fn usual_ns(&self) -> u64 {
         self.median_ns + self.send_ns
     }
@@ -206,7 +206,7 @@ impl Floor {
         }
     }
 
-    /// Learns from a finished tick; returns its floor.
+    /// Updates from a finished tick; returns its floor.
     pub(super) fn learn(&mut self, laps: &Laps) -> u64 {
         let late_ns = std::mem::take(&mut self.late_ns);
         self.note_ending(late_ns + laps.publish_cpu_ns);
@@ -269,7 +269,7 @@ mod tests {
             let clock = ManualClock::new(1_000 * began_us);
             let mut began = Began::now(&clock);
             clock.advance(1_000 * (ran_us + others_us));
-            // The clock by hand knows of no others: the thread had run for so much longer before.
+            // The manual clock has no other threads: the thread had run for that much longer before.
             began.cpu_ns += 1_000 * others_us;
             began.passed_ns(1_000 * deadline_us, &clock) / 1_000
         };

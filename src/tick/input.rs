@@ -1,4 +1,4 @@
-//! What a tick is given, and what becomes of its edits.
+//! Input of a tick, and the outcome of its edits.
 
 use crate::time::Budget;
 use crate::wire::{Demand, Inbox, TickCause, TickRow};
@@ -7,44 +7,44 @@ use crate::world::{Applied, Edit};
 /// One request's edits: all of them are done, or none.
 #[derive(Clone, Debug)]
 pub struct EditBatch {
-    /// The asker's number, echoed in the outcome.
+    /// The requester's number, echoed in the outcome.
     pub token: u64,
     /// The edits, in their order.
     pub edits: Vec<Edit>,
-    /// Check every structure first, and build anew what does not hold: said in the outcome's warnings.
+    /// Check every structure first, and rebuild those that fail; reported in the outcome's warnings.
     pub validate: bool,
-    /// Things the asker should know that stop nothing.
+    /// Hints for the requester that stop nothing.
     pub warnings: Vec<String>,
 }
 
-/// What became of a batch.
+/// Outcome of a batch.
 #[derive(Clone, Debug)]
 pub struct EditOutcome {
-    /// The asker's number.
+    /// The requester's number.
     pub token: u64,
-    /// Done from which scene revision on, or what to change.
+    /// The scene revision from which on it is done, or what to change.
     pub result: Result<Applied, String>,
     /// As in the batch.
     pub warnings: Vec<String>,
 }
 
-/// What one tick is given.
+/// Input of one tick.
 pub struct TickInput<'a> {
     /// Frames to admit, in order.
     pub inbox: &'a Inbox,
     /// Edits to apply, each batch whole or not at all.
     pub edits: &'a [EditBatch],
-    /// Who listens.
+    /// Which messages have readers.
     pub demand: Demand,
     /// What may be spent.
     pub budget: Budget,
     /// Why this tick.
     pub cause: TickCause,
-    /// Place of the source whose frame caused it.
+    /// Index of the source whose frame caused it.
     pub cause_source: Option<usize>,
     /// When the daemon woke for it, `CLOCK_MONOTONIC` nanoseconds.
     pub woke_ns: u64,
-    /// Gets a bare `unknown` tick at least each heartbeat while this tick goes on.
+    /// Receives a bare `unknown` tick at least each heartbeat while this tick goes on.
     pub pulse: Option<&'a mut dyn FnMut(&TickRow)>,
 }
 

@@ -1,29 +1,29 @@
-//! When the operating system, or the host below it, is due to interrupt the thread.
+//! When the operating system, or the host below it, will interrupt the thread.
 //!
-//! A kernel's timer interrupts a core 100 to 1,000 times a second, to the microsecond. That takes 1 to 5 us; on a
-//! virtual machine 20 to 60, and two timers beat there, the guest's and its host's. Work that ends within its budget
-//! but for such an interrupt is late by as much as it takes. It is due at a known moment, though: work that it would
-//! carry past its end can end before it. That costs a tick some 2 us on average, where two timers take 50 us each.
+//! A kernel's timer interrupts a core 100 to 1,000 times a second, precise to the microsecond. That takes 1 to 5 us; on
+//! a virtual machine 20 to 60, with two timers, the guest's and its host's. Work that would end within its budget is
+//! late by the duration of such an interrupt. But the interrupt comes at a predictable time: work that it would delay
+//! past its end can end before it. That costs a tick some 2 us on average, with two timers of 50 us each.
 
 use crate::time::Pause;
 
-/// Pauses remembered, the oldest overwritten first.
+/// Number of pauses remembered, the oldest overwritten first.
 const SEEN: usize = 128;
-/// How long a pause is remembered, nanoseconds. An interrupt that ticks end before is not seen: where each tick has the
-/// same place among them, it has to be met anew when this is over. Longer, and a place is kept to that the timer has
-/// left: a host's clock drifts against the guest's, by 7 us a second where it was measured.
+/// How long a pause is remembered, nanoseconds. If ticks end before an interrupt, it is not seen: where each tick has
+/// the same phase, the interrupt must be met again after this time. If this is longer, outdated phases are kept: a
+/// host's clock drifts against the guest's, by 7 us a second where it was measured.
 const RECENT_NS: u64 = 10_000_000_000;
 /// Shorter pauses between two reads of the clock are work, nanoseconds.
 const SHORTEST_NS: u64 = 18_000;
-/// A thread that was away for longer met more than a timer.
+/// Longer pauses have another cause than a timer, nanoseconds.
 const LONGEST_NS: u64 = 100_000;
-/// At 1,000 and 250 Hz all of a timer's interrupts have few places in this, nanoseconds.
+/// At 1,000 and 250 Hz the interrupts of a timer have few phases within this period, nanoseconds.
 const PERIOD_NS: u64 = 4_000_000;
-/// Places so near are one timer's, nanoseconds: the clock was last read as long before as a unit of work takes.
+/// Phases this close belong to one timer, nanoseconds: the last read of the clock is up to one unit of work earlier.
 const NEAR_NS: u64 = 10_000;
-/// So many pauses at one place are a timer: long units of work lie anywhere.
+/// This many pauses at one phase are a timer: long units of work have random phases.
 const AGREE: usize = 5;
-/// Work that is to end before an interrupt ends so much before it is due, nanoseconds.
+/// Work that must end before an interrupt ends this much before it is due, nanoseconds.
 const BEFORE_NS: u64 = 2_000;
 
 /// Pauses between two reads of the clock that may have been interrupts.
@@ -51,10 +51,10 @@ impl Interrupts {
         }
     }
 
-    /// When work is to end that goes on at `now_ns` and has until `end_ns`: then, or before the first interrupt that
-    /// would carry it past that; before now, where that is just due.
+    /// When work must end that starts at `now_ns` and has until `end_ns`: at that time, or before the first interrupt
+    /// that would delay it past that; before `now_ns` if that interrupt is just due.
     ///
-    /// * `closing_ns` - what comes after the last unit of work.
+    /// * `closing_ns` - time needed after the last unit of work.
     pub(super) fn clear_end_ns(&self, now_ns: u64, end_ns: u64, closing_ns: u64) -> u64 {
         let lately = end_ns.saturating_sub(RECENT_NS)..=end_ns;
         let recent = || {
@@ -65,7 +65,7 @@ impl Interrupts {
             let apart_ns = one.from_ns.abs_diff(other.from_ns) % PERIOD_NS;
             apart_ns.min(PERIOD_NS - apart_ns) <= NEAR_NS
         };
-        // The last time before the end when the timer that made this pause, if one did, will interrupt.
+        // The last time before the end at which the timer behind this pause, if there is one, will interrupt.
         let due_ns = |pause: &Pause| end_ns - (end_ns - pause.from_ns) % PERIOD_NS;
         recent()
             .filter(|pause| due_ns(pause) + pause.ns + closing_ns > end_ns)
@@ -95,7 +95,7 @@ mod tests {
         guest.into_iter().chain(host)
     }
 
-    /// Numbers in no order that means anything.
+    /// Pseudo-random numbers.
     fn scattered() -> impl FnMut() -> u64 {
         let mut random = 7_u64;
         move || {
@@ -122,7 +122,7 @@ mod tests {
                 late += u32::from(passes(clear_ns));
                 given_up_ns += end_ns - clear_ns;
             }
-            // The clock was last read some time before; one stretch in thirty holds a long unit of work instead.
+            // The clock was last read some time before; one stretch in thirty has a long unit of work instead.
             let jitter_ns = random() % 3_000;
             if let Some(timer) = timers(now_ns, clear_ns).max_by_key(|timer| timer.ns) {
                 interrupts.note(Pause {
@@ -146,7 +146,7 @@ mod tests {
     fn a_tick_that_has_one_place_among_interrupts_meets_few() {
         let mut interrupts = Interrupts::default();
         let mut late = 0;
-        // 100 Hz beside a guest's timer at 250 Hz: each second tick would be carried past its end by 30 us.
+        // 100 Hz ticks with a guest's timer at 250 Hz: each second tick would overrun by 30 us.
         for tick in 0..10_000_u64 {
             let now_ns = 1_000_000_000 + tick * 10_000_000 + 697_000;
             let end_ns = now_ns + 300_000;
@@ -198,10 +198,10 @@ mod tests {
         let clear = |now_ns, end_ns| interrupts.clear_end_ns(now_ns, end_ns, CLOSING_NS);
         let before_ns = due_ns - BEFORE_NS;
         assert_eq!(clear(due_ns - 50_000, due_ns + 10_000), before_ns);
-        // Just due, it is waited for by nobody; then it has come.
+        // Just due: work does not wait for it; then it is over.
         assert_eq!(clear(due_ns + 5_000, due_ns + 34_000), before_ns);
         assert_eq!(clear(due_ns + 11_000, due_ns + 34_000), due_ns + 34_000);
-        // It would be over in time, and closing after it.
+        // It would be over in time, including the closing work.
         assert_eq!(clear(due_ns - 50_000, due_ns + 36_000), due_ns + 36_000);
         let later_ns = due_ns + RECENT_NS + 10_000;
         assert_eq!(clear(later_ns - 50_000, later_ns), later_ns);

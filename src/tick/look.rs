@@ -1,4 +1,4 @@
-//! What the engine knows, to look at: for clients' answers, benches and tests.
+//! Read access to the engine's data: for answers to clients, benches and tests.
 
 use super::{EditOutcome, Engine};
 use crate::narrow::{Counters, Narrow};
@@ -8,7 +8,7 @@ use crate::wire::Outbox;
 use crate::world::World;
 
 impl Engine {
-    /// What became of the edits of the last tick.
+    /// Outcomes of the edits of the last tick.
     #[must_use]
     pub fn outcomes(&self) -> &[EditOutcome] {
         &self.outcomes
@@ -32,7 +32,7 @@ impl Engine {
         &self.pairs
     }
 
-    /// What the last tick filled.
+    /// The outbox of the last tick.
     #[must_use]
     pub fn outbox(&self) -> &Outbox {
         &self.out
@@ -50,13 +50,13 @@ impl Engine {
         self.narrow.counters()
     }
 
-    /// The time of the last tick, nanoseconds of `CLOCK_BOOTTIME`; before the first when the engine was made.
+    /// The time of the last tick, nanoseconds of `CLOCK_BOOTTIME`; before the first, the time when the engine was made.
     #[must_use]
     pub fn now_ns(&self) -> u64 {
         self.now_ns
     }
 
-    /// Ticks so far.
+    /// Number of ticks so far.
     #[must_use]
     pub fn ticks(&self) -> u64 {
         self.tick

@@ -1,5 +1,5 @@
-//! The engine: one tick, in order. A library type with no transport in it; the daemon, tests and benches drive the
-//! same one.
+//! The engine: one tick, in order. A library type with no transport in it; the daemon, tests and benches use the same
+//! one.
 //!
 //! In: [`TickInput`] (frames, edits, demand, budget, and why this tick). Out: a filled [`Outbox`].
 
@@ -49,24 +49,24 @@ pub struct Engine {
     broad: BroadPhase,
     /// The method of `broad`.
     method: Method,
-    /// The broad phase is to be built anew in this tick.
+    /// Rebuild the broad phase in this tick.
     renew: bool,
-    /// The pairs of before: those of a body whose place is not known go on, though no boxes say so. And the pairs that
-    /// were forced in that tick.
+    /// Pairs carried over a rebuild: those of bodies whose place is unknown (their boxes prove nothing), and the pairs
+    /// that were forced in that tick.
     carried: Vec<PairKey>,
-    /// The last tick that left structures which were checked and held; 0: none was.
+    /// Last tick whose structures passed a full check; 0: never.
     checked: u64,
-    /// All bodies as inserted: how a broad phase is built anew.
+    /// A change set that inserts every body; the input of a rebuild.
     whole: ChangeSet,
     pairs: PairSet,
     delta: PairDelta,
     narrow: Narrow,
     publisher: Publisher,
     plan: Plan,
-    /// What the plan counts, kept from edit to edit.
+    /// The counts that the plan is based on, kept from edit to edit.
     kinds: Kinds,
     audience: Audience,
-    /// What the plan in force was made for, beside the scene.
+    /// What the plan in force was made for, in addition to the scene.
     seen: Seen,
     out: Outbox,
     outcomes: Vec<EditOutcome>,
@@ -95,7 +95,7 @@ impl std::fmt::Debug for Engine {
 impl Engine {
     /// An engine for a checked scene and its built shapes.
     ///
-    /// * `shapes` - one list a body, in the scene's order.
+    /// * `shapes` - one list per body, in the scene's order.
     /// * `boot_id` - random number of this start.
     ///
     /// # Errors
@@ -161,7 +161,7 @@ impl Engine {
         self.tick_at(now_ns, input)
     }
 
-    /// As [`Engine::tick`], for who has read the clock already and gone by that.
+    /// As [`Engine::tick`], for a caller that has already read the clock and decided by it.
     ///
     /// * `now_ns` - nanoseconds of `CLOCK_BOOTTIME`.
     pub fn tick_at(&mut self, now_ns: u64, mut input: TickInput<'_>) -> &Outbox {
@@ -181,12 +181,12 @@ impl Engine {
         &self.out
     }
 
-    /// Sets the time-out of a source, by its place; from the next tick on every age is judged by it.
+    /// Sets the time-out of a source, by its index; from the next tick on every age is judged by it.
     pub fn set_timeout(&mut self, source: usize, timeout_ns: u64) {
         self.world.set_timeout(source, timeout_ns);
     }
 
-    /// Frames of a source that were passed over for newer ones; `None`: of no source of the scene.
+    /// Counts frames of a source that were skipped for newer ones; `None`: of an unknown source.
     pub fn note_skipped(&mut self, source: Option<SourceSlot>, frames: u64) {
         match source {
             Some(source) => self.world.note_skipped(source, frames),
@@ -204,7 +204,7 @@ impl Engine {
         Laps::start(Arc::clone(&self.clock), input.woke_ns)
     }
 
-    /// * `is_edited` - whether the bodies are other ones; else they are not looked at.
+    /// * `is_edited` - whether the set of bodies changed; otherwise bodies are not examined.
     fn replan(&mut self, is_edited: bool) {
         let plan = if is_edited {
             self.kinds.follow(&self.world);
@@ -222,7 +222,7 @@ impl Engine {
     fn find_candidates(&mut self) {
         let (world, filters) = (&self.world, self.world.filters());
         let method = self.plan.method();
-        // Taken whatever the method does: else a tick in which both hold would be followed by a second renewal.
+        // Taken even if the method changes: otherwise a tick with both would be followed by a second rebuild.
         let renew = std::mem::take(&mut self.renew);
         if renew {
             self.carried.retain(|key| {
@@ -258,7 +258,7 @@ impl Engine {
         self.narrow.widen(&self.world, &mut self.pairs);
     }
 
-    /// Spends what the budget leaves above the floor; returns the units spent.
+    /// Spends the part of the budget above the floor; returns the units spent.
     fn narrow_within(&mut self, input: &mut TickInput<'_>, laps: &Laps) -> u64 {
         let budget = input.budget;
         let demand = input.demand;
@@ -298,8 +298,8 @@ impl Engine {
         units
     }
 
-    /// The tick that goes out alone while this one takes longer than a heartbeat. It has this tick's number, an earlier
-    /// `sent_ns`, and no sources: it is the result of no frame. What counts up in a boot is as it was.
+    /// The row of a tick that is sent early while this one takes longer than a heartbeat. It has this tick's number, an
+    /// earlier `sent_ns`, and no sources, as it is the result of no frame. Counters of this boot are unchanged.
     fn bare_tick(&self, input: &TickInput<'_>) -> TickRow {
         TickRow {
             header: MessageHeader {
@@ -340,11 +340,12 @@ impl Engine {
         self.publisher.fill(&mut view, &mut self.out);
     }
 
-    /// Fills the tick's times and units, and learns the floor.
+    /// Fills the tick's times and units, and updates the floor.
     fn finish(&mut self, input: &TickInput<'_>, laps: &Laps, units: u64) {
         let floor_ns = self.floor.learn(laps);
         let elapsed_ns = laps.elapsed_ns() + self.floor.last_send_ns();
-        // Below its floor a tick takes the floor, and is late as any other: who waits for it wants to know.
+        // A budget below the floor does not shorten the tick, which then counts as late like any other, as readers
+        // expect.
         let overrun = self.end.is_over(elapsed_ns);
         self.missed += u64::from(overrun);
         let row = &mut self.out.tick;
@@ -389,7 +390,7 @@ fn place(source: Option<usize>) -> u8 {
         .unwrap_or(u8::MAX)
 }
 
-/// Gives a broad phase of another method the threads that it may use.
+/// Gives a broad phase of another method its threads.
 fn share(broad: &mut BroadPhase, config: &Config) {
     broad.use_threads(config.threads.unwrap_or(1), limits::SHARED_TESTS_MIN);
 }

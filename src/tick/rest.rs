@@ -1,8 +1,7 @@
-//! What is left of a tick's budget after its outbox was handed over: narrowing goes on, and the next tick tells what it
-//! found.
+//! The rest of a tick's budget after its outbox was sent: narrowing goes on, and the next tick reports what it found.
 //!
-//! More is kept back for publishing than it mostly takes, because how long it takes varies; what it did not take is
-//! used here.
+//! More time is reserved for publishing than it usually takes, because its duration varies; what it did not use is used
+//! here.
 
 use super::Engine;
 use super::floor::Began;
@@ -13,43 +12,43 @@ use crate::time::Meter;
 use crate::wire::Undelivered;
 use crate::world::{BuiltTree, TreeOf, WornTree};
 
-/// Kept back of the tick's end at least, nanoseconds: for the query that is under way then, and for closing the work
-/// lists. Timers' interrupts are kept clear of, see [`Interrupts`].
+/// Least reserve before the tick's end, nanoseconds: for the query in progress then, and for closing the work lists.
+/// Timer interrupts are avoided separately, see [`Interrupts`].
 const LAST_NS: u64 = 6_000;
-/// Kept back at most, as a part of what the budget leaves above the floor.
+/// Largest reserve, as a fraction (1 / `LAST_PARTS`) of the budget above the floor.
 const LAST_PARTS: u64 = 8;
-/// What is kept back grows by this with each tick that passes its end in spite of it, nanoseconds.
+/// The reserve grows by this with each tick that overruns in spite of it, nanoseconds.
 const LATE_NS: u64 = 4_000;
-/// What is kept back shrinks by this with each tick that does not pass its end, nanoseconds. As a part of [`LATE_NS`]
-/// it says how many do: between the bounds one tick in a hundred and forty. With more, more are late; with less, time
-/// that nothing needs is kept back for longer.
+/// The reserve shrinks by this with each tick that does not overrun, nanoseconds. Its ratio to [`LATE_NS`] sets how
+/// many overrun: within the bounds one tick in a hundred and forty. With more, more are late; with less, unneeded time
+/// is reserved for longer.
 const IN_TIME_NS: u64 = 28;
 
-/// The last tick's budget after its outbox was handed over.
+/// The last tick's budget after its outbox was sent.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rest {
-    /// What was asked of the narrow phase, and when the tick's time is up, `CLOCK_MONOTONIC` nanoseconds; `None`:
-    /// nothing is left to do, or to do it in.
+    /// What the narrow phase shall compute, and when the tick's time is up, `CLOCK_MONOTONIC` nanoseconds; `None`: no
+    /// work or no time is left.
     pub(super) open: Option<(Wanted, u64)>,
     /// Used so far, nanoseconds and work units.
     pub(super) spent_ns: u64,
     pub(super) units: u64,
-    /// Kept back of the tick's end, nanoseconds.
+    /// Reserve before the tick's end, nanoseconds.
     last_ns: u64,
-    /// The most that may be, unless that is less than [`LAST_NS`].
+    /// Largest reserve, unless that is less than [`LAST_NS`].
     most_ns: u64,
-    /// What interrupts the thread now and then, so that it does not at the tick's end.
+    /// Periodic interrupts of the thread, so that none falls on the tick's end.
     pub(super) interrupts: Interrupts,
 }
 
 impl Rest {
-    /// Takes what the budget leaves above the floor, nanoseconds.
+    /// Takes the part of the budget above the floor, nanoseconds.
     pub(super) fn leave(&mut self, above_ns: u64) {
         self.most_ns = above_ns / LAST_PARTS;
         self.keep(self.last_ns);
     }
 
-    /// Work went on until a tick's end, and passed it by `late_ns` more than was kept back.
+    /// Work went on until a tick's end, and overran by `late_ns` more than the reserve.
     fn note_end(&mut self, late_ns: u64) {
         let last_ns = if late_ns > 0 {
             self.last_ns + LATE_NS
@@ -71,24 +70,25 @@ impl Engine {
         self.out.plan_changed = false;
     }
 
-    /// What of the last outbox could not be handed over: the next one has the events that are lacking.
+    /// What could not be delivered of the last outbox: the next one contains the missing events.
     pub fn note_undelivered(&mut self, unsent: Undelivered) {
         self.publisher.note_undelivered(unsent);
     }
 
-    /// A tree that has become loose, to be built by a worker; see [`crate::world::World::worn_tree`].
+    /// A tree that has become loose, for a worker to rebuild; see [`crate::world::World::worn_tree`].
     #[must_use]
     pub fn worn_tree(&self) -> Option<WornTree> {
         self.world.worn_tree()
     }
 
-    /// That of one body alone; see [`crate::world::World::worn_tree_of`].
+    /// The same for one body; see [`crate::world::World::worn_tree_of`].
     #[must_use]
     pub fn worn_tree_of(&self, body: BodyId) -> Option<WornTree> {
         self.world.worn_tree_of(body)
     }
 
-    /// Puts a built tree in place, between two ticks; pairs of the body then start from its root. Whether it was taken.
+    /// Puts a built tree in place, between two ticks; pairs of the body then start from its root. Returns whether it
+    /// was taken.
     pub fn take_tree(&mut self, built: BuiltTree) -> bool {
         self.world.take_tree(built)
     }
@@ -98,10 +98,10 @@ impl Engine {
         self.world.refuse_tree(of)
     }
 
-    /// Works on what the last tick left undone, within its budget of time and for at most `slice_ns`; what is found
-    /// goes out with the next tick. Returns whether there is more to do and time to do it.
+    /// Works on what the last tick left undone, within its time budget and for at most `slice_ns`; results are sent
+    /// with the next tick. Returns whether there is more to do and time for it.
     ///
-    /// Ticks under a budget of work units do not go on: they replay bit for bit.
+    /// Not used for ticks with a budget of work units: they replay bit for bit.
     pub fn work_on(&mut self, slice_ns: u64) -> bool {
         let Some((wanted, end_ns)) = self.rest.open.take() else {
             return false;
@@ -138,7 +138,7 @@ mod tests {
     fn less_than_one_end_in_a_hundred_is_passed_and_never_more_than_its_part_is_kept_back() {
         let mut rest = Rest::default();
         rest.leave(1_200_000);
-        // Each 100th end comes 60 us late, each 20th 25 us; the first are not told apart from the others' at once.
+        // Each 100th end comes 60 us late, each 20th 25 us; at first these cannot be told apart.
         let late_ns = |end: u64| match (end % 100, end % 20) {
             (0, _) => 60_000,
             (_, 1) => 25_000,

@@ -1,9 +1,9 @@
-//! Transports: how frames and requests come in and results go out. In: samples of other processes, copied once and
+//! Transports: how frames and requests come in and results go out. In: samples from other processes, copied once and
 //! unchecked. Out: an [`Inbox`] for the engine, and the engine's [`Outbox`] for readers.
 //!
-//! Doors with one surface, the trait [`Door`]: [`iceoryx`] for other processes, [`memory`] for threads of this one
-//! (tests, the embedded feed), `ros2` for a ROS 2 graph, and [`Both`] of two. [`client`] is the other side of the first
-//! two. A door belongs to the thread that opened it.
+//! All transports implement the trait [`Door`]: [`iceoryx`] for other processes, [`memory`] for threads of this one
+//! (tests, and programs that embed the daemon), `ros2` for a ROS 2 graph, and [`Both`] for two at once. [`client`] is
+//! the other side of the first two. A door belongs to the thread that opened it.
 
 mod both;
 pub mod client;
@@ -24,8 +24,8 @@ use crate::error::Result;
 use crate::time::Clock;
 use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow, Undelivered};
 
-/// How long a wait looks before it sleeps where nothing else is said, nanoseconds: on a single core it would only keep
-/// the other side from its work.
+/// Default time that a wait spins before it sleeps, nanoseconds: on a single core spinning would only keep the other
+/// side from its work.
 pub(crate) fn spin_default_ns() -> u64 {
     match std::thread::available_parallelism() {
         Ok(cores) if cores.get() > 1 => crate::limits::SPIN_US_DEFAULT * 1000,
@@ -33,14 +33,14 @@ pub(crate) fn spin_default_ns() -> u64 {
     }
 }
 
-/// Why [`Door::wait`] came back. Nothing set: the time was up.
+/// Why [`Door::wait`] returned. Nothing set: the time was up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wake {
-    /// A client said that it sent a frame or a request. May be said once more than there is something to receive.
+    /// A client signalled that it sent a frame or a request. May be set once although nothing is left to receive.
     pub notified: bool,
     /// A client came, left or died.
     pub peers_changed: bool,
-    /// A signal cut the wait.
+    /// A signal interrupted the wait.
     pub interrupted: bool,
 }
 
@@ -48,7 +48,7 @@ pub struct Wake {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RequestToken(pub u64);
 
-/// What an operator set while the daemon runs; applied between two ticks.
+/// A setting that an operator changed while the daemon runs; applied between two ticks.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Setting {
     /// Time a tick may take, nanoseconds; `None`: no limit.
@@ -57,44 +57,44 @@ pub enum Setting {
     BudgetUnits(Option<u64>),
     /// What makes a tick.
     Mode(Mode),
-    /// Time-out of a source, by its place.
+    /// Time-out of a source, by its index.
     Timeout {
-        /// Place of the source in the scene.
+        /// Index of the source in the scene.
         source: usize,
         /// Nanoseconds.
         timeout_ns: u64,
     },
-    /// How near pairs of the bodies that are there must come to be told as near, metres; `None`: as each was put.
+    /// Pairs of the present bodies with a smaller gap are reported as near, metres; `None`: as each body was put.
     Margin(Option<f64>),
     /// A tick at once.
     TickNow,
-    /// Time went back for all: every pair ends, bodies that move are not received again.
+    /// Time went back for all sources: every pair ends, bodies that move are not received again.
     Reset,
 }
 
-/// What a door needs to know of a body to take its poses from elsewhere, and to show it.
+/// What a door needs to know about a body to take its poses from elsewhere, and to display it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BodyNote {
     /// Its id.
     pub id: u64,
     /// Its name.
     pub name: String,
-    /// Place of its source in the scene.
+    /// Index of its source in the scene.
     pub source: Option<usize>,
     /// Its frame in `/tf`.
     pub frame: String,
     /// Its topic; empty: none.
     pub topic: String,
-    /// Whether each of its poses is a part of its way.
+    /// Whether it is continuous: each of its poses is part of its path.
     pub continuous: bool,
-    /// Centre and half extents of its box in its own frame, metres; `None`: it has no end.
+    /// Centre and half extents of its box in its own frame, metres; `None`: it is infinite.
     pub bounds: Option<([f64; 3], [f64; 3])>,
 }
 
 /// What an edit did to a body.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BodyChange {
-    /// It came, or is another now.
+    /// It came, or was replaced.
     Put(BodyNote),
     /// It left: its name.
     Removed(String),
@@ -103,7 +103,7 @@ pub enum BodyChange {
 /// The daemon's side of a transport.
 ///
 /// One round: `wait`, `receive`, `requests`, then `demand`, the engine's tick, `publish`. A round without a tick ends
-/// in `housekeeping` instead of `publish`.
+/// with `housekeeping` instead of `publish`.
 pub trait Door {
     /// Waits until a client has sent something, a signal came, or `timeout_ns` have passed.
     ///
@@ -111,21 +111,21 @@ pub trait Door {
     /// `Error::Io` when the wake-up port itself is broken; the daemon must then restart.
     fn wait(&mut self, timeout_ns: u64, clock: &dyn Clock) -> Result<Wake>;
 
-    /// Copies what came since into the inbox, per source at most its queue (4 frames), so that no flooder starves
-    /// the others; what is beyond limits comes as a frame without rows that says why.
+    /// Copies new frames into the inbox, per source at most its queue (4 frames), so that a flooding client does not
+    /// starve the others; a frame beyond limits comes without rows and with the reason.
     fn receive(&mut self, inbox: &mut Inbox, clock: &dyn Clock);
 
-    /// What is listened to now. `publish` sends what was in demand at the last call, nothing else, so an outbox
-    /// that was not filled is never sent as "nothing touches".
+    /// The messages that have readers now. `publish` sends only what was in demand at the last call, so an outbox that
+    /// was not filled is never sent as "nothing touches".
     fn demand(&mut self) -> Demand;
 
     /// Sends contacts, regions, pairs, changes, bodies, body verdicts, names and plan (where new), then the tick, then
     /// one `ready` event; never waits for a reader.
     ///
-    /// * returns - what could not be handed over; the engine is to hear of it before its next tick.
+    /// * returns - what could not be delivered; the engine must be informed before its next tick.
     ///
     /// # Errors
-    /// `Error::Io` when the tick itself could not be sent: readers would hear nothing.
+    /// `Error::Io` when the tick itself could not be sent: readers would receive nothing.
     fn publish(&mut self, outbox: &Outbox) -> Result<Undelivered>;
 
     /// Sends a tick alone, between the slices of a long one.
@@ -134,32 +134,32 @@ pub trait Door {
     /// As [`Door::publish`].
     fn publish_tick(&mut self, tick: &TickRow) -> Result<()>;
 
-    /// Hands over each new request that is whole: its token, header and payload (`json_len` bytes of JSON, then blobs;
+    /// Passes on each new complete request: its token, header and payload (`json_len` bytes of JSON, then blobs;
     /// checked to fit). It stays open until it is answered. A request that cannot be read is answered here.
     ///
-    /// A large one is copied by so much a call that no call takes long; while there is more, `wait` comes back at once.
+    /// A large one is copied in parts so that no call takes long; while there is more, `wait` returns at once.
     fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, Vec<u8>));
 
     /// Answers a request with JSON; a client that has left is no error.
     ///
     /// # Errors
-    /// `Error::Io` when the answer could not be handed over.
+    /// `Error::Io` when the answer could not be delivered.
     fn answer(&mut self, token: RequestToken, ok: bool, json: &str) -> Result<()>;
 
-    /// Hands over what was set since the last call; a door without an operator has nothing.
+    /// Passes on settings changed since the last call; a door without an operator has none.
     fn settings(&mut self, _take: &mut dyn FnMut(Setting)) {}
 
-    /// Whether it is to be told what edits do to bodies; a door whose frames name bodies has no use for it.
+    /// Returns whether it must be informed of what edits do to bodies; not needed if its frames name bodies.
     fn follows_bodies(&self) -> bool {
         false
     }
 
-    /// Says what edits did to bodies, after the tick that applied them.
+    /// Reports what edits did to bodies, after the tick that applied them.
     fn bodies(&mut self, _changes: &[BodyChange]) {}
 
-    /// Says what the log says; for those who do not see it.
+    /// Repeats a log message, for users who do not see the log.
     fn tell(&mut self, _words: &str) {}
 
-    /// Lets late joiners have the newest state, forgets requests of clients that left. Cheap; each idle round.
+    /// Gives late joiners the newest state, and drops requests of clients that left. Cheap; called in each idle round.
     fn housekeeping(&mut self);
 }

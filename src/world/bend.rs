@@ -1,8 +1,8 @@
 //! Vertices: the newest shapes of bodies that deform.
 //!
-//! In: vertex frames from a client that may be wrong in every field. Out: vertices taken, motion sums and boxes with
-//! them at once, refusals counted, bodies marked unknown. A frame is looked at as a whole before any of it is taken, so
-//! a refused one leaves the last good shape. No allocation, unless somebody else holds the shape at that moment.
+//! In: vertex frames from a client that may be wrong in every field. Out: new vertices, with motion sums and boxes
+//! updated at once, refusals counted, bodies marked unknown. A frame is checked as a whole before any of it is applied,
+//! so a refused one leaves the last good shape. No allocation, unless another owner holds the shape at that moment.
 
 use std::sync::Arc;
 
@@ -17,23 +17,23 @@ use crate::math::Aabb;
 use crate::shape::{NoVertex, Shape, can_be_vertices};
 use crate::wire::{RejectReason, VertexFrame, WIRE_VERSION, name_str, vertex_flags};
 
-/// What is known of the vertices of a body that deforms.
+/// State of the vertices of a body that deforms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vertices {
-    /// Version of the vertices it has; `None`: those of the scene, which nobody has sent in this session.
+    /// Version of its vertices; `None`: those of the scene, none were sent in this session.
     pub version: Option<u64>,
-    /// Why its newest vertices were refused, when they were.
+    /// Why its newest vertices were refused, if they were.
     pub refused: Option<RejectReason>,
-    /// Box and radius in the scene, by which a put tells whether it is another shape.
+    /// Box and radius in the scene, by which a put detects whether the shape is another.
     pub(super) rest: (Aabb, f64),
-    /// How often they have been taken.
+    /// Number of updates.
     pub(super) updates: u64,
-    /// The last tree that was asked for could not be built.
+    /// The last requested tree could not be built.
     pub(super) unbuilt: Option<Unbuilt>,
 }
 
-/// A tree that could not be built: it is not asked for again before there are other vertices, twice as many updates
-/// later each time.
+/// A tree that could not be built: it is not requested again before there are other vertices; after each further
+/// failure the wait doubles, in updates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Unbuilt {
     pub(super) times: u32,
@@ -41,7 +41,7 @@ pub(super) struct Unbuilt {
 }
 
 impl Vertices {
-    /// Of a body that deforms, as the scene has it.
+    /// For a body that deforms, as the scene defines it.
     pub(super) fn of(shape: &Shape) -> Self {
         Self {
             version: None,
@@ -52,54 +52,55 @@ impl Vertices {
         }
     }
 
-    /// What was known is void.
+    /// Resets the state.
     pub(super) fn forget(&mut self) {
         (self.version, self.refused) = (None, None);
     }
 }
 
 impl Body {
-    /// The one shape of a body that deforms.
+    /// The single shape of a body that deforms.
     pub(super) fn bending_shape(&mut self) -> Option<&mut Shape> {
         self.vertices.as_ref()?;
-        // Somebody who measures the body at this moment holds it as it was.
+        // Another owner that measures the body at this moment keeps the old state.
         let placed = self.shapes.only_mut()?;
         Some(Arc::make_mut(&mut placed.shape))
     }
 
-    /// Whether boxes in its tree are older than its vertices.
+    /// Returns whether boxes in its tree are older than its vertices.
     #[must_use]
     pub fn lags(&self) -> bool {
         let lags = |body: &Self| body.shapes.first().is_some_and(|p| p.shape.lag_m() > 0.0);
         self.vertices.is_some() && lags(self)
     }
 
-    /// Fits all boxes of its tree to its vertices, in a copy of its own where others hold the shape.
+    /// Fits all boxes of its tree to its vertices, in a separate copy if there are other owners of the shape.
     ///
-    /// Cost: O(triangles) where they lag, else none.
+    /// Cost: O(triangles) if they lag, else none.
     pub fn fit_boxes(&mut self) {
-        // To change what somebody else holds is to copy it.
+        // Modifying a shared shape copies it.
         if !self.lags() {
             return;
         }
         if let Some(shape) = self.bending_shape() {
-            // A round that was under way is finished first, and boxes done by then may be older than the last vertices.
+            // A round in progress is finished first, and boxes done in it may be older than the last vertices.
             while shape.refit(usize::MAX) > 0 {}
         }
     }
 }
 
 impl World {
-    /// The bodies that deform, in no order that means anything.
+    /// The bodies that deform, in arbitrary order.
     #[must_use]
     pub fn deforming(&self) -> &[BodySlot] {
         &self.deforming
     }
 
-    /// Fits boxes of a body that deforms to its vertices, at most so many packs of them; returns how many were done.
+    /// Fits boxes of a body that deforms to its vertices, at most `packs_max` packs of them; returns how many were
+    /// done.
     pub fn refit(&mut self, slot: BodySlot, packs_max: usize) -> usize {
         let body = self.bodies.get_mut(slot.index()).and_then(Option::as_mut);
-        // Looked at first: to change what somebody else holds is to copy it.
+        // Checked first: modifying a shared shape copies it.
         match body
             .filter(|body| body.lags())
             .and_then(Body::bending_shape)
@@ -109,13 +110,13 @@ impl World {
         }
     }
 
-    /// Admits vertices of one body, or says why not. Bad input is counted, never an error.
+    /// Admits vertices of one body, or returns why not. Bad input is counted, never an error.
     ///
-    /// Only who may move the body may bend it, in a session under the same rules as for poses. What is wrong with the
-    /// vertices of the right sender leaves the body unknown until good ones of all vertices come; an older version, or
+    /// Only the source that may move the body may bend it, in a session under the same rules as for poses. Wrong
+    /// vertices from the right sender leave the body unknown until good ones of all vertices come; an older version, or
     /// the same again, changes nothing.
     ///
-    /// What belongs with a frame that waits for a scene revision waits with it.
+    /// Vertices that belong to a frame that waits for a scene revision wait with it.
     ///
     /// Cost: O(rows).
     pub fn admit_vertices(&mut self, frame: &VertexFrame, now_boot_ns: u64) -> Admission {
@@ -128,7 +129,7 @@ impl World {
         }
     }
 
-    /// As [`World::admit_vertices`], whatever waits.
+    /// As [`World::admit_vertices`], without waiting.
     pub(super) fn admit_vertices_now(&mut self, frame: &VertexFrame) -> Admission {
         let (found, mut refused) = (self.find_bent(frame), None);
         let taken = found.and_then(|(source, slot)| {
@@ -154,7 +155,7 @@ impl World {
         })
     }
 
-    /// Layout, source, session, body: what is said before the vertices themselves are looked at.
+    /// Layout, source, session, body: the checks before the vertices themselves.
     fn find_bent(
         &mut self,
         frame: &VertexFrame,
@@ -175,7 +176,7 @@ impl World {
         if self.sources[source.index()].note_bent(header) {
             self.lose_vertices(source);
         }
-        // Who may not bend it ends nobody's session.
+        // A sender that may not bend the body cannot end another's session.
         let found = self.find_bendable(source, header.body);
         if header.session != self.sources[source.index()].session
             && let Err(reason) = found
@@ -190,7 +191,7 @@ impl World {
         match stand_beside(state, source, &mut self.over, header, received_ns) {
             Standing::Refused(reason) => return refused(reason),
             Standing::Afresh => {
-                // A frame that still waits is of before.
+                // A frame that still waits is from before.
                 state.pass_over_waiting();
                 state.note_bent(header);
                 self.forget_poses(source);
@@ -200,7 +201,7 @@ impl World {
         found.map_or_else(refused, |slot| Ok((source, slot)))
     }
 
-    /// The body of this id, if the source may bend it.
+    /// The body with this id, if the source may bend it.
     fn find_bendable(&self, source: SourceSlot, body: u64) -> Result<BodySlot, RejectReason> {
         let slot = self
             .slot_of(BodyId(body))
@@ -212,7 +213,7 @@ impl World {
         }
     }
 
-    /// Takes the vertices of a frame whose sender may bend the body, all or none.
+    /// Applies the vertices of a frame whose sender may bend the body, all or none.
     fn bend(&mut self, slot: BodySlot, frame: &VertexFrame) -> Result<(), RejectReason> {
         let first = self.check_vertices(slot, frame)?;
         let Some(body) = self.bodies[slot.index()].as_mut() else {
@@ -244,7 +245,7 @@ impl World {
         Ok(())
     }
 
-    /// Counts, versions, numbers; yields the place of the first vertex.
+    /// Checks counts, versions, numbers; yields the index of the first vertex.
     fn check_vertices(&self, slot: BodySlot, frame: &VertexFrame) -> Result<usize, RejectReason> {
         let header = &frame.header;
         let body = self.body(slot).ok_or(RejectReason::UnknownBody)?;
@@ -285,7 +286,7 @@ impl World {
         }
     }
 
-    /// Vertices of a source were lost, of which body is not known: all that it has bent may have another shape by now.
+    /// Vertices of a source were lost, for an unknown body: all bodies that it has bent may have another shape by now.
     fn lose_vertices(&mut self, source: SourceSlot) {
         for at in 0..self.deforming.len() {
             let slot = self.deforming[at];

@@ -1,7 +1,7 @@
-//! Vertices that belong with a frame which waits for a scene revision: they wait for it, so that no tick has the one
-//! without the other.
+//! Vertices that belong to a frame which waits for a scene revision: they wait for it, so that no tick has one without
+//! the other.
 //!
-//! In: messages of a source while frames of it wait. Out: the same in their order, as soon as such a frame is taken.
+//! In: messages of a source while frames of it wait. Out: the same in order, as soon as such a frame is taken.
 
 use std::collections::VecDeque;
 
@@ -15,7 +15,7 @@ use crate::wire::{RejectReason, VertexFrame, VertexHeader};
 #[derive(Clone, Debug, Default)]
 pub(super) struct BendsWaiting {
     list: VecDeque<VertexFrame>,
-    /// How many vertices they have.
+    /// Number of vertices in them.
     rows: usize,
 }
 
@@ -29,7 +29,7 @@ impl BendsWaiting {
         self.list.push_back(frame);
     }
 
-    /// Takes the first out, where it is wanted.
+    /// Takes the first one, if it is wanted.
     fn take(&mut self, wanted: impl FnOnce(&VertexHeader) -> bool) -> Option<VertexFrame> {
         let first = self.list.front()?;
         if !wanted(&first.header) {
@@ -41,7 +41,7 @@ impl BendsWaiting {
 }
 
 impl SourceState {
-    /// Whether vertices belong with a frame that waits, or that will wait behind it, or come behind such.
+    /// Returns whether vertices must wait: for a waiting frame or a later one, or behind vertices that wait.
     fn keeps_waiting(&self, header: &VertexHeader) -> bool {
         let epoch = self.order.map(|(epoch, _)| epoch);
         if header.session != self.session || epoch != Some(header.epoch) {
@@ -54,7 +54,7 @@ impl SourceState {
 }
 
 impl World {
-    /// Puts vertices behind the frames of their source that wait, where they belong there.
+    /// Queues vertices behind the waiting frames of their source, if they belong there.
     ///
     /// * returns - whether it did.
     pub(super) fn bends_later(&mut self, source: SourceSlot, frame: &VertexFrame) -> bool {
@@ -83,8 +83,8 @@ impl World {
         true
     }
 
-    /// A frame has been taken: what belongs with the newest taken, or with one before it, bends now; but not before
-    /// those that still wait, which a pause may have overtaken.
+    /// A frame has been taken: vertices that belong to the newest taken frame, or an earlier one, are applied now; but
+    /// not before those that still wait, which a pause may have overtaken.
     pub(super) fn bend_with(&mut self, source: SourceSlot) {
         let state = &self.sources[source.index()];
         let Some(newest) = &state.newest else {
@@ -106,9 +106,9 @@ impl World {
         }
     }
 
-    /// Vertices that are never taken: the body is not what its sender said last.
+    /// Vertices that are never applied: the body differs from what its sender reported last.
     fn lose_bend(&mut self, source: SourceSlot, vertices: &VertexFrame) {
-        // Its loss is told of this body here, and not of all by the gap in the numbers.
+        // The loss is reported for this body here, and not for all bodies by the gap in the numbers.
         let _of_before = self.sources[source.index()].note_bent(&vertices.header);
         let Some(slot) = self.slot_of(BodyId(vertices.header.body)) else {
             return;

@@ -13,11 +13,11 @@ use super::twist::Twist;
 /// A body as the engine sees it in this tick.
 #[derive(Clone, Debug)]
 pub struct Body {
-    /// What clients call it.
+    /// Its id, as clients use it.
     pub id: BodyId,
     /// Unique name.
     pub name: String,
-    /// Raised when a body of this name is put again; caches carry it.
+    /// Raised when a body of this name is put again; caches use it as part of their key.
     pub generation: u32,
     /// Its shapes.
     pub shapes: Parts,
@@ -27,7 +27,7 @@ pub struct Body {
     pub unbounded: bool,
     /// Last admitted pose, scene frame.
     pub pose: Pose,
-    /// How fast that pose moves, where the sender said it; of a body that hangs on another as the other moves it.
+    /// Velocity of that pose, if the sender gave it; for a body attached to another, as the other moves it.
     pub velocity: Option<Twist>,
     /// Centre of its geometry in the body frame: the reference point of its motion.
     pub centre: Point,
@@ -35,19 +35,19 @@ pub struct Body {
     pub radius: f64,
     /// How far it has moved, for certificates.
     pub motion: Motion,
-    /// Its way since the last tick, where it is continuous or a continuous body hangs on it.
+    /// Its path since the last tick, if it is continuous or a continuous body is attached to it.
     pub path: Option<Box<Path>>,
-    /// What is known of its vertices, where it deforms: then its one shape is its own.
+    /// State of its vertices, if it deforms: then its single shape is not shared.
     pub vertices: Option<Box<Vertices>>,
-    /// Tight box at `pose` (of a continuous body: around its way), widened by `report_within_m` and `reach_m`: its
-    /// proxy.
+    /// Its proxy: the tight box at `pose` (for a continuous body: around its path), widened by `report_within_m` and
+    /// `reach_m`.
     pub proxy: Aabb,
     /// Whether its place is known.
     pub status: BodyStatus,
     /// How far any of its surface points may be from where `pose` puts it, metres: 0 for a known body, infinite for
     /// an unknown one whose speed is not bounded.
     pub reach_m: f64,
-    /// Why its newest pose or vertices were refused, when they were.
+    /// Why its newest pose or vertices were refused, if they were.
     pub reject: Option<RejectReason>,
     /// The source that may move it.
     pub source: Option<SourceSlot>,
@@ -57,22 +57,23 @@ pub struct Body {
     pub since_ns: Option<u64>,
     /// When `pose` was received, nanoseconds of `CLOCK_BOOTTIME`.
     pub received_ns: u64,
-    /// The time-out of the source that `pose` is from, where that is not the body's own: of what it hung on.
+    /// The time-out of the source of `pose`, if that is not the body's own source but that of a body it was attached
+    /// to.
     pub(super) lent_timeout_ns: u64,
-    /// Pairs nearer than this are reported, metres.
+    /// Pairs with a smaller gap are reported, metres.
     pub report_within_m: f64,
-    /// Greatest speed of any of its surface points, metres a second.
+    /// Greatest speed of any of its surface points, metres per second.
     pub max_speed_mps: Option<f64>,
-    /// Weight of its pairs in the order of work; 1: as any other.
+    /// Weight of its pairs in the order of work; 1: normal.
     pub priority: f64,
-    /// What happens when it is too old; `None`: what its source says.
+    /// What happens when its pose is too old; `None`: as its source says.
     pub on_stale: Option<OnStale>,
     /// Whether it has a proxy in the broad phase.
     pub in_broad: bool,
 }
 
 impl Body {
-    /// How fast a frame moves that is fixed to the body, where the body's own velocity is known.
+    /// Velocity of a frame fixed to the body, if the body's own velocity is known.
     ///
     /// * `point` - the frame's origin, body frame, metres.
     #[must_use]
@@ -81,15 +82,15 @@ impl Body {
     }
 }
 
-/// How far a body has moved: a path over anchors, and the displacement from the newest anchor.
+/// How far a body has moved: a path length over anchors, and the displacement from the newest anchor.
 ///
-/// A path length alone would burn a metre a second on 1 mm of vibration at 1 kHz; the displacement from an anchor
-/// costs a vibrating body nothing.
+/// A path length alone would grow by a metre a second with 1 mm of vibration at 1 kHz; with the displacement from an
+/// anchor, vibration costs nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// Pose from which `offset_m` is measured.
     pub anchor: Pose,
-    /// `S`: length of the path over all anchors, and all that it was deformed by, metres, rounded up.
+    /// `S`: length of the path over all anchors, plus all deformation, metres, rounded up.
     pub path_m: f64,
     /// The largest displacement of a vertex, summed over all updates, metres, rounded up.
     pub bent_m: f64,
@@ -119,10 +120,10 @@ impl Motion {
         }
     }
 
-    /// Takes vertices none of which went farther than `step_m`.
+    /// Takes new vertices, none of which moved farther than `step_m`.
     ///
-    /// The sum, not the displacement since some moment: what went 1 cm there and back has been there. It is in `S` and
-    /// not in `d`, where every test would pay for it twice.
+    /// The sum, not the displacement since some time: a vertex that moved 1 cm there and back has been there. It is
+    /// added to `S` and not to `d`, where every test would count it twice.
     ///
     /// * `radius` - with the new vertices.
     pub fn bend(&mut self, step_m: f64, pose: &Pose, centre: &Point, radius: f64) {
@@ -133,8 +134,8 @@ impl Motion {
         self.offset_m = displacement(&self.anchor, pose, centre, radius);
     }
 
-    /// Takes a new anchor at the pose last moved to: for a body that enters the broad phase, whose certificates are yet
-    /// to be made and should not pay for where it was before.
+    /// Takes a new anchor at the last pose: for a body that enters the broad phase, whose certificates are yet to be
+    /// made and should not be charged for earlier motion.
     pub fn anchor_here(&mut self, pose: &Pose) {
         if self.offset_m > 0.0 {
             self.path_m = self.spent_m();
@@ -143,33 +144,33 @@ impl Motion {
         self.anchor = *pose;
     }
 
-    /// `S + d`: what a certificate's expiry is compared with.
+    /// `S + d`: compared with a certificate's expiry.
     #[must_use]
     pub fn spent_m(&self) -> f64 {
         (self.path_m + self.offset_m).next_up()
     }
 
-    /// `S - d`: what is stored with a certificate.
+    /// `S - d`: stored with a certificate.
     #[must_use]
     pub fn credit_m(&self) -> f64 {
         (self.path_m - self.offset_m).next_down()
     }
 }
 
-/// A body taken out of the broad phase, and why.
+/// A body removed from the broad phase, and why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Removed {
     /// Its slot; free for another body from the next tick on.
     pub slot: BodySlot,
-    /// What its pairs' ends will say.
+    /// The cause reported with the ends of its pairs.
     pub cause: EndCause,
 }
 
-/// What a tick changed, for the broad and narrow phase. Emptied and refilled each tick; each slot stands at most once
-/// in each list. A body that leaves and comes back in one tick stands in `removed` and in `inserted`: removals first.
+/// What a tick changed, for the broad and narrow phase. Cleared and refilled each tick; each slot is at most once in
+/// each list. A body that leaves and comes back in one tick is in `removed` and in `inserted`: removals first.
 #[derive(Clone, Debug, Default)]
 pub struct ChangeSet {
-    /// Bodies that left the broad phase (removed, disabled, reset, taken out by age).
+    /// Bodies that left the broad phase (removed, disabled, reset, or too old).
     pub removed: Vec<Removed>,
     /// Bodies that entered it (first pose, put, enabled).
     pub inserted: Vec<BodySlot>,
@@ -182,7 +183,7 @@ pub struct ChangeSet {
 }
 
 impl ChangeSet {
-    /// Empties every list, keeps the memory.
+    /// Clears every list, keeps the memory.
     pub fn clear(&mut self) {
         self.removed.clear();
         self.inserted.clear();

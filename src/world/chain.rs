@@ -1,12 +1,12 @@
-//! What is known of bodies by what they hang on, until one of those hangs or is elsewhere.
+//! Data derived from chains of attachment, valid until one of the bodies is attached or placed elsewhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Something known of bodies, and which of them hang on which.
+/// Derived data of bodies, and which of them are attached to which.
 #[derive(Clone, Debug)]
 pub(super) struct Chain<K, V> {
     pub(super) known: BTreeMap<K, V>,
-    /// By a body those that hang on it.
+    /// By body: the bodies attached to it.
     below: BTreeMap<K, BTreeSet<K>>,
 }
 
@@ -20,12 +20,12 @@ impl<K, V> Default for Chain<K, V> {
 }
 
 impl<K: Copy + Ord, V> Chain<K, V> {
-    /// Notes that one hangs on another; whether that is new.
+    /// Records that one is attached to another; returns whether that is new.
     pub(super) fn hang(&mut self, upper: K, lower: K) -> bool {
         self.below.entry(upper).or_default().insert(lower)
     }
 
-    /// Forgets a body and what hangs on it, and that in turn.
+    /// Drops a body and everything attached to it, directly or indirectly.
     pub(super) fn forget(&mut self, body: K) {
         let mut all = vec![body];
         while let Some(at) = all.pop() {

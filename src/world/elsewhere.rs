@@ -1,6 +1,6 @@
-//! Bodies as they would stand elsewhere, for questions: nothing of the world changes.
+//! Bodies as they would be elsewhere, for queries: the world does not change.
 //!
-//! In: a body, a pose. Out: a body at rest there, and what goes with it.
+//! In: a body, a pose. Out: a body at rest there, and the bodies attached to it.
 
 use super::World;
 use super::body::{Body, Motion};
@@ -14,7 +14,7 @@ use crate::scene::BodySpec;
 use crate::wire::BodyStatus;
 
 impl Body {
-    /// A copy without its way since the last tick: a few pointers and numbers, whatever its shapes are.
+    /// A copy without its path since the last tick: a few pointers and numbers, whatever its shapes are.
     #[must_use]
     pub fn still(&self) -> Self {
         Self {
@@ -26,7 +26,7 @@ impl Body {
         }
     }
 
-    /// As it would stand at a pose: its place beyond doubt, its box tight.
+    /// The body as it would be at a pose: its place certain, its box tight.
     #[must_use]
     pub fn at(&self, pose: &Pose) -> Self {
         Self {
@@ -43,16 +43,16 @@ impl Body {
         }
     }
 
-    /// On its way from where it is: the centre of its geometry straight, its turn at a constant rate.
+    /// The body moving from where it is: the centre of its geometry straight, its turn at a constant rate.
     ///
-    /// * `linear` - of its frame's origin now, scene frame, metres a second.
-    /// * `angular` - scene frame, radians a second.
+    /// * `linear` - velocity of its frame's origin now, scene frame, metres per second.
+    /// * `angular` - scene frame, radians per second.
     #[must_use]
     pub fn on_way(&self, linear: Vec3, angular: Vec3, seconds: f64) -> Self {
         self.on_way_about(&self.centre, linear, angular, seconds)
     }
 
-    /// As [`Body::on_way`], where another point goes straight than the centre of its geometry.
+    /// As [`Body::on_way`], but another point than the centre of its geometry moves straight.
     ///
     /// * `pivot` - body frame, metres.
     #[must_use]
@@ -84,7 +84,7 @@ impl Body {
         }
     }
 
-    /// Shapes that are no body of the scene, as one.
+    /// A body made of shapes that belong to no body of the scene.
     #[must_use]
     pub fn of_shapes(shapes: Parts, pose: &Pose) -> Self {
         let spec = BodySpec {
@@ -96,7 +96,7 @@ impl Body {
 }
 
 impl World {
-    /// The body that one hangs on in the end, itself where it hangs on none, and its pose seen from there.
+    /// The root of the body's chain of attachments, or itself, and its pose relative to that.
     #[must_use]
     pub fn root_of(&self, slot: BodySlot) -> (BodySlot, Pose) {
         let entry = self.entries.get(slot.index());
@@ -105,7 +105,7 @@ impl World {
         })
     }
 
-    /// The bodies that hang on one, also over others, each with its pose seen from that one; by slot.
+    /// The bodies attached to a body, directly or through others, each with its pose relative to it; by slot.
     ///
     /// Cost: O(attached bodies).
     #[must_use]

@@ -1,7 +1,7 @@
-//! Where somebody looks: how much more a place in view counts in the order of work.
+//! The viewpoint: how much more a place in view counts in the order of work.
 //!
-//! In: the scene's viewpoint and the pose of the body that carries it. Out: a weight for a place, by whether it is
-//! seen, how far from the middle of the view, and how far away.
+//! In: the scene's viewpoint and the pose of the body that carries it. Out: a weight for a place, by visibility, angle
+//! from the centre of the view, and distance.
 //!
 //! Source: RTR3 section 17.6.1, after O'Sullivan and Dingliana: priority by visibility, eccentricity and distance.
 
@@ -10,14 +10,14 @@ use crate::config::Viewpoint;
 use crate::math::{Point, Vec3};
 use crate::wire::BodyStatus;
 
-/// What the edge of the view counts, as a share of its middle.
+/// Weight at the edge of the view, as a share of that at its centre.
 const EDGE: f64 = 0.5;
 
 /// An eye in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gaze {
     eye: Point,
-    /// Unit.
+    /// Unit vector.
     direction: Vec3,
     half_angle_rad: f64,
     weight: f64,
@@ -25,10 +25,9 @@ pub struct Gaze {
 }
 
 impl Gaze {
-    /// How much a ball counts: 1 where nothing of it is in view, the viewpoint's weight where it is right ahead and
-    /// near.
+    /// Weight of a ball: 1 if no part of it is in view, the viewpoint's weight if it is straight ahead and near.
     ///
-    /// * `centre`, `radius_m` - scene frame; all of a half-space (infinite) is around the eye.
+    /// * `centre`, `radius_m` - scene frame; a half-space (infinite) always surrounds the eye.
     #[must_use]
     pub fn weight(&self, centre: &Point, radius_m: f64) -> f64 {
         let to = centre - self.eye;
@@ -51,7 +50,7 @@ impl Gaze {
 }
 
 impl World {
-    /// From where somebody looks in this tick; `None`: the scene has no viewpoint, or where its body is is not known.
+    /// The viewpoint of this tick; `None`: the scene has none, or the place of its body is unknown.
     #[must_use]
     pub fn gaze(&self) -> Option<Gaze> {
         let Viewpoint {
@@ -107,7 +106,7 @@ mod tests {
         assert!((at(11.0, 6.0) - 1.0).abs() < 1e-12, "out of view");
         assert!((at(-9.0, 0.0) - 1.0).abs() < 1e-12, "behind");
         assert!((at(1.05, 0.0) - 9.0).abs() < 1e-12, "around the eye");
-        // Half of what is more than 1 is left at the distance said.
+        // Half of the excess over 1 is left at the given distance.
         let far = |x: f64| gaze(Some(5.0)).weight(&Point::new(x, 0.0, 0.0), 0.0);
         assert!((far(6.0) - 5.0).abs() < 1e-12);
         assert!(far(100.0) > 1.0 && far(100.0) < far(50.0));

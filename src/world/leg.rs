@@ -1,34 +1,34 @@
-//! The way of a body from one pose to the next.
+//! The motion of a body from one pose to the next.
 //!
-//! In: two poses, and what the sender says of the turn between them. Out: a pivot that goes straight and a turn about a
-//! fixed axis at a constant rate; and a box that holds the body meanwhile.
+//! In: two poses, and the turn between them that the sender gives. Out: a pivot that moves straight and a turn about a
+//! fixed axis at a constant rate; and a box that contains the motion.
 
 use crate::limits::LEG_TURNS_MAX;
 use crate::math::{Aabb, Point, Pose, Quat, ROUND, Vec3};
 
-/// A turn below this has no axis that could be told from rounding (32-bit senders: 1e-7), radians.
+/// A smaller turn has no axis that is distinguishable from rounding (32-bit senders: 1e-7), radians.
 const AXIS_MIN_RAD: f64 = 1e-3;
 
-/// The way from one pose to the next.
+/// The motion from one pose to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leg {
     /// Where it begins.
     pub from: Pose,
     /// Where it ends.
     pub to: Pose,
-    /// The pivot at the begin, scene frame.
+    /// The pivot at the start, scene frame.
     pub pivot: Point,
-    /// What the pivot goes, scene frame, metres.
+    /// Translation of the pivot, scene frame, metres.
     pub travel: Vec3,
     /// The turn, scene frame: axis times angle, radians.
     pub spin: Vec3,
-    /// Whole turns on top, about an axis of their own: only where the turn itself has none that could be told.
+    /// Additional whole turns about a separate axis: only if the turn itself has no distinguishable axis.
     pub extra: Vec3,
-    /// A step beyond the body's `teleport_m`, or over a reset: what lies between is not asked.
+    /// A step beyond the body's `teleport_m`, or over a reset: not swept.
     pub jump: bool,
     /// A step over a reset.
     pub lapse: bool,
-    /// Which of the frames with poses that its source sent in this tick it ends at, from 1.
+    /// Number, from 1, of the frame that it ends at, among those with poses that its source sent in this tick.
     pub frame: u32,
 }
 
@@ -36,7 +36,7 @@ impl Leg {
     /// The pose at a share of the leg.
     #[must_use]
     pub fn at(&self, share: f64, pivot: &Point) -> Pose {
-        // Both ends to the last bit: certificates were made there.
+        // Both ends exactly, to the last bit: certificates were made there.
         if share >= 1.0 {
             return self.to;
         } else if share <= 0.0 {
@@ -52,23 +52,23 @@ impl Leg {
         Pose::from_parts(at.coords.into(), turned)
     }
 
-    /// The whole angle that it turns by, radians.
+    /// The total angle of the turn, radians.
     #[must_use]
     pub fn angle(&self) -> f64 {
         self.spin.norm() + self.extra.norm()
     }
 
-    /// Whether it goes nowhere.
+    /// Returns whether it does not move.
     #[must_use]
     pub fn is_still(&self) -> bool {
         self.travel == Vec3::zeros() && self.angle() == 0.0 && self.from == self.to
     }
 }
 
-/// A box that holds a body all along a leg, from those at its ends.
+/// A box that contains a body along a leg, from the boxes at its ends.
 ///
 /// A point at distance `r` from the pivot leaves the straight line between its two ends by at most `angle^2 r / 8`; and
-/// it never leaves the ball about the pivot. Both hold, so their intersection does.
+/// it never leaves the ball around the pivot. Both bounds hold, so their intersection does.
 pub(super) fn swept_box(
     leg: &Leg,
     pivot: &Point,
@@ -77,7 +77,7 @@ pub(super) fn swept_box(
 ) -> Aabb {
     let angle = leg.angle() * (1.0 + 8.0 * ROUND);
     let far = leg.from.translation.vector.amax() + leg.to.translation.vector.amax();
-    // Poses on the way are products of rounded numbers as large as these.
+    // Poses between are products of rounded numbers of this size.
     let rounding = 64.0 * ROUND * (far + pivot.coords.amax() + (1.0 + angle) * reach);
     let straight = begin
         .merged(end)
@@ -90,10 +90,10 @@ pub(super) fn swept_box(
     }
 }
 
-/// The turn between two orientations: the shortest, or the one nearest to what the sender says; whole turns about the
-/// sender's own axis where the turn has none that could be told; and whether it can be followed.
+/// The turn between two orientations: the shortest, or the one nearest to what the sender gives; whole turns about the
+/// sender's own axis if the turn has no distinguishable axis; and whether it can be followed.
 pub(super) fn turn_of(from: &Quat, to: &Quat, declared: Option<Vec3>) -> (Vec3, Vec3, bool) {
-    // Rounding turns nothing that was sent as it was.
+    // Rounding must not turn an orientation that was sent unchanged.
     let is_same = from.coords == to.coords;
     let shortest = if is_same {
         Vec3::zeros()
@@ -113,11 +113,11 @@ pub(super) fn turn_of(from: &Quat, to: &Quat, declared: Option<Vec3>) -> (Vec3, 
     };
     let turns = ((declared - shortest).dot(&axis) / full).round();
     if turns.is_nan() || turns.abs() > LEG_TURNS_MAX {
-        // Its box is the ball about its centre's way, and nothing else is known.
+        // Its box is the ball swept along its centre's path, and nothing else is known.
         return (shortest, Vec3::repeat(LEG_TURNS_MAX * full), false);
     }
     let more = axis * (turns * full);
-    // What stands as it did has turned about the sender's axis alone.
+    // An unchanged orientation has turned about the sender's axis only.
     if has_axis || is_same {
         (shortest + more, Vec3::zeros(), true)
     } else {

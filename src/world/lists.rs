@@ -1,4 +1,4 @@
-//! Fills a [`ChangeSet`] while the tick goes on: each slot at most once a list, and what is taken back leaves no trace.
+//! Fills a [`ChangeSet`] during the tick: each slot at most once per list; undone changes leave no trace.
 //!
 //! In: what happened to a slot. Out: the change set as the broad phase reads it, removals first.
 
@@ -9,7 +9,7 @@ use crate::wire::EndCause;
 /// Not in the list.
 const NONE: u32 = u32::MAX;
 
-/// Where a slot stands in each list of the change set.
+/// Index of a slot in each list of the change set.
 #[derive(Clone, Copy, Debug)]
 struct Places {
     removed: u32,
@@ -29,7 +29,7 @@ impl Places {
     };
 }
 
-/// The change set of this tick, and for each slot where it stands there.
+/// The change set of this tick, and each slot's index in it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lists {
     set: ChangeSet,
@@ -37,7 +37,7 @@ pub(super) struct Lists {
 }
 
 impl Lists {
-    /// Empties every list. Cost: what stood in them.
+    /// Clears every list. Cost: their contents.
     pub(super) fn clear(&mut self) {
         let set = &self.set;
         let slots = set
@@ -79,11 +79,11 @@ impl Lists {
     pub(super) fn insert(&mut self, slot: BodySlot) {
         let places = &mut self.places[slot.index()];
         push(&mut self.set.inserted, &mut places.inserted, slot);
-        // What it did in its former life of this tick means nothing to the new one.
+        // Earlier changes of this slot in this tick do not apply to the new body.
         self.drop_changes(slot);
     }
 
-    /// The slot left the broad phase. A slot that only entered it in this tick leaves no trace of that.
+    /// The slot left the broad phase. If it only entered in this tick, no trace is left.
     pub(super) fn remove(&mut self, slot: BodySlot, cause: EndCause) {
         let at = self.places[slot.index()].inserted;
         if at == NONE {
@@ -128,7 +128,7 @@ impl Lists {
         self.drop_from(slot, |set| &mut set.requery, |p| &mut p.requery);
     }
 
-    /// Takes a slot out of one list; the list's last slot takes its place.
+    /// Removes a slot from one list; the list's last slot takes its place.
     fn drop_from(
         &mut self,
         slot: BodySlot,
@@ -146,7 +146,7 @@ impl Lists {
         }
     }
 
-    /// What is wrong with the places, if anything.
+    /// Returns an error if the indices are inconsistent.
     pub(super) fn validate(&self) -> Result<(), String> {
         let set = &self.set;
         type Place = fn(&Places) -> u32;
@@ -182,7 +182,7 @@ fn push(list: &mut Vec<BodySlot>, place: &mut u32, slot: BodySlot) {
     }
 }
 
-/// A list is never longer than there are slots, and those are u32.
+/// A list is never longer than the number of slots, and those are u32.
 fn place_of(len: usize) -> u32 {
     u32::try_from(len).unwrap_or(NONE - 1)
 }
@@ -220,7 +220,7 @@ mod tests {
         assert_eq!(lists.set().removed.len(), 1);
         assert_eq!(lists.set().inserted, [BodySlot(0)]);
         assert!(lists.set().moved.is_empty() && lists.set().requery.is_empty());
-        // Again gone: the first cause stays, and it is not there twice.
+        // Removed again: the first cause stays, and it is listed once.
         lists.remove(BodySlot(0), EndCause::Removed);
         assert_eq!(lists.set().removed.len(), 1);
         assert_eq!(lists.set().removed[0].cause, EndCause::Reset);

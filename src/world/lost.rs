@@ -1,8 +1,8 @@
-//! Bodies whose place is not known and whose reach has no bound: they keep their pairs, and which make new ones.
+//! Bodies whose place is unknown and whose reach is unbounded: they keep their pairs; and which of them make new ones.
 //!
-//! In: judgements. Out: flags of the filters. The box of such a body says nothing, and makes no pairs; but it does
-//! for a tick in which it says something: the body was there as the tick began in which its place was lost, or a frame
-//! said where it went, though that is too old by now, or a refused pose or a reset came behind it.
+//! In: judgements. Out: flags of the filters. The box of such a body is meaningless, and makes no pairs, except in a
+//! tick in which it has a meaning: the body was there when the tick began in which its place was lost; or a frame
+//! reported where it went, although that is too old by now or was followed by a refused pose or a reset.
 
 use super::World;
 use super::body::Body;
@@ -14,7 +14,7 @@ use crate::wire::BodyStatus;
 impl World {
     /// Sets the flags that follow from a judgement.
     ///
-    /// * `was_in` - whether the body was in the broad phase before it.
+    /// * `was_in` - whether the body was in the broad phase before.
     pub(super) fn flag_lost(&mut self, slot: BodySlot, judged: Judgement, was_in: bool) {
         let keeps = judged.in_broad && judged.reach_m.is_infinite();
         let goes = keeps && self.goes_as_told(slot);
@@ -27,22 +27,22 @@ impl World {
             self.met.push(slot);
         }
         let told_again = kept && !keeps;
-        // What it was barred from is found by those methods alone that look at all of its box.
+        // Pairs that it was barred from are found only by queries of its whole box.
         if judged.in_broad && (told_again || keeps && barred && !bars) {
             self.lists.requery(slot);
         }
     }
 
-    /// Whether a body that has no place any more, because it was reset or is too old, is asked for the way that it
-    /// still went in this tick.
+    /// Returns whether a body that has no place any more, because it was reset or is too old, is still swept along the
+    /// path that it moved in this tick.
     ///
-    /// Not before all frames are there: one that follows on a reset may bring it back, and that is no motion.
+    /// Not before all frames are in: one after a reset may bring it back, and that is no motion.
     pub(super) fn stays_for_its_way(&self, slot: BodySlot) -> bool {
         !self.admits && self.goes_as_told(slot)
     }
 
-    /// All frames are there: who went in this tick and has no place since comes back for its way. What hangs on it
-    /// follows where that is settled.
+    /// After all frames: a body that moved in this tick and lost its place since comes back to be swept. Bodies
+    /// attached to it follow when it is settled.
     pub(super) fn recall_lost(&mut self) {
         for at in 0..self.travelled.len() {
             let slot = self.travelled[at];
@@ -53,7 +53,7 @@ impl World {
         }
     }
 
-    /// A tick begins: who came back for its way has been asked for it.
+    /// A tick begins: bodies that came back to be swept have been, and leave.
     pub(super) fn dismiss_lost(&mut self) {
         for at in 0..self.travelled.len() {
             let slot = self.travelled[at];
@@ -70,7 +70,7 @@ impl World {
         }
     }
 
-    /// Whether a continuous body has gone in this tick, and where is known.
+    /// Returns whether a continuous body has moved in this tick along a known path.
     fn goes_as_told(&self, slot: BodySlot) -> bool {
         let Some(body) = self.body(slot) else {
             return false;
@@ -82,7 +82,7 @@ impl World {
         path.is_some_and(|path| path.is_swept()) && vertices.all(|v| v.refused.is_none())
     }
 
-    /// A tick begins: who was lost in the last one makes no pairs any more.
+    /// A tick begins: bodies lost in the last one make no pairs any more.
     pub(super) fn bar_lost(&mut self) {
         for slot in self.met.drain(..) {
             if let Some(hot) = self.filters.bodies.get_mut(slot.index()) {

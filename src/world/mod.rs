@@ -1,10 +1,10 @@
-//! The world: which bodies there are, where they are, how old that is, and who may say so.
+//! The world: which bodies there are, where they are, how old that is, and which source may move them.
 //!
-//! In: frames (`wire::Inbox`), edits, the time. Out: a [`ChangeSet`] for the broad phase. Bad input is never an
-//! error here: it is a counted `RejectReason`, and what it leaves unknown is said so.
+//! In: frames (`wire::Inbox`), edits, the time. Out: a [`ChangeSet`] for the broad phase. Bad input is never an error
+//! here: it is counted as a `RejectReason`, and what becomes unknown by it is reported as unknown.
 //!
-//! A tick calls, in this order: [`World::begin_tick`], [`World::apply`] for each edit request, [`World::admit`] for
-//! each frame, [`World::age`] once. After that [`World::changes`] is complete.
+//! A tick calls, in this order: [`World::begin_tick`], [`World::apply_stepwise`] for each edit request,
+//! [`World::admit`] for each frame, [`World::age`] once. After that [`World::changes`] is complete.
 
 mod admit;
 mod admit_rows;
@@ -83,14 +83,14 @@ pub struct World {
     entries: Vec<Entry>,
     ages: Ages,
     tags: Tags,
-    /// The bodies there are, by id.
+    /// All bodies, by id.
     order: Vec<(BodyId, BodySlot)>,
     names: Names,
     filters: Filters,
     rigid_groups: Names,
     sources: Vec<SourceState>,
     over: SessionsOver,
-    /// Low half of the boot id; 0: not said.
+    /// Low half of the boot id; 0: unknown.
     boot: u32,
     /// Slots free for another body.
     free: Vec<BodySlot>,
@@ -98,7 +98,7 @@ pub struct World {
     resting: Vec<BodySlot>,
     /// Bodies that take their pose from another.
     attached: Vec<BodySlot>,
-    /// Stale bodies whose reach still grows.
+    /// Stale bodies whose reach is still growing.
     growing: Vec<BodySlot>,
     /// Bodies whose place is lost and whose boxes make pairs in this tick.
     met: Vec<BodySlot>,
@@ -116,17 +116,17 @@ pub struct World {
     scene_rev: u64,
     names_changed: bool,
     edited: bool,
-    /// What edits changed of what the filters make of the scene, and nobody has looked at yet.
+    /// Changes by edits of what the filters derive from the scene, not yet counted.
     uncounted: Uncounted,
-    /// Slots that edits of this tick touched: another body is in them or none, it may move and could not or the other
-    /// way round, or its margin is another; any number of times.
+    /// Slots that edits of this tick touched: a body was added, replaced or removed, was made movable or fixed, or got
+    /// another margin. May contain duplicates.
     touched: Vec<BodySlot>,
-    /// The change set was not taken yet by a tick: what `new` put there.
+    /// No tick has taken the change set yet: it is what `new` put there.
     first: bool,
     tick: u64,
-    /// Frames are being admitted: ages are judged for good once all are.
+    /// Frames are being admitted: final judgement of ages comes after all of them.
     admits: bool,
-    /// When this tick began, nanoseconds of `CLOCK_BOOTTIME`; `now_ns` gets there with its first frame.
+    /// When this tick began, nanoseconds of `CLOCK_BOOTTIME`; `now_ns` is set to it with the tick's first frame.
     begun_ns: u64,
     now_ns: u64,
     stale_reach_m: f64,
@@ -137,12 +137,12 @@ pub struct World {
 impl World {
     /// The world of a scene before any frame: bodies that cannot move are known, all others are not received.
     ///
-    /// * `shapes` - one list a body, in the scene's order.
+    /// * `shapes` - one list per body, in the scene's order.
     /// * `clock_now_boot_ns` - `CLOCK_BOOTTIME`.
     ///
     /// # Errors
-    /// `Error::Scene` when the scene does not hold together: names or ids twice, a reference to nothing, shapes
-    /// missing, too many bodies.
+    /// `Error::Scene` when the scene is inconsistent: duplicate names or ids, a reference to nothing, missing shapes,
+    /// too many bodies.
     pub fn new(scene: &Scene, shapes: Vec<Parts>, clock_now_boot_ns: u64) -> Result<Self> {
         if shapes.len() != scene.bodies.len() {
             let (given, wanted) = (shapes.len(), scene.bodies.len());
@@ -234,7 +234,7 @@ impl World {
         }
     }
 
-    /// Opens a tick: the change set is empty again, and slots freed in the tick before may be used.
+    /// Opens a tick: the change set is cleared, and slots freed in the last tick may be used.
     ///
     /// * `now_boot_ns` - nanoseconds of `CLOCK_BOOTTIME`.
     pub fn begin_tick(&mut self, tick: u64, now_boot_ns: u64) {
@@ -264,7 +264,7 @@ impl World {
         self.bodies.get(slot.index())?.as_ref()
     }
 
-    /// What a pair's row says of a body, by slot, without a look at the body.
+    /// The part of a body that pair rows need, by slot, without reading the body itself.
     #[must_use]
     #[inline]
     pub fn tag(&self, slot: BodySlot) -> Option<&Tag> {
@@ -277,14 +277,14 @@ impl World {
         self.order.iter().filter_map(body)
     }
 
-    /// Where a body is.
+    /// The slot of a body.
     #[must_use]
     pub fn slot_of(&self, id: BodyId) -> Option<BodySlot> {
         let at = self.order.binary_search_by_key(&id, |e| e.0).ok()?;
         Some(self.order[at].1)
     }
 
-    /// Where the body of a name is.
+    /// The slot of the body with a name.
     #[must_use]
     pub fn slot_named(&self, name: &str) -> Option<BodySlot> {
         self.names.find_name(name)?.slot
@@ -296,7 +296,7 @@ impl World {
         self.bodies.len()
     }
 
-    /// A body's proxy: its tight box, widened by `report_within_m` and its reach; `None` where no body is.
+    /// A body's proxy: its tight box, widened by `report_within_m` and its reach; `None` if there is no body.
     #[must_use]
     pub fn proxy(&self, slot: BodySlot) -> Option<&Aabb> {
         Some(&self.body(slot)?.proxy)
@@ -308,14 +308,14 @@ impl World {
         &self.sources
     }
 
-    /// The place of a source.
+    /// The index of a source.
     #[must_use]
     pub fn source_named(&self, name: &str) -> Option<SourceSlot> {
         let place = self.sources.iter().position(|s| s.name == name)?;
         Some(SourceSlot::at(place))
     }
 
-    /// The moment that it stands at, nanoseconds of `CLOCK_BOOTTIME`: that of the newest tick.
+    /// The time of the world, nanoseconds of `CLOCK_BOOTTIME`: that of the newest tick.
     #[must_use]
     pub fn now_ns(&self) -> u64 {
         self.now_ns
@@ -327,60 +327,60 @@ impl World {
         self.scene_rev
     }
 
-    /// Whether bodies came, went or got another source in this tick, so that names must be sent again.
+    /// Returns whether bodies came, went or got another source in this tick, so that names must be sent again.
     #[must_use]
     pub fn names_changed(&self) -> bool {
         self.names_changed
     }
 
-    /// Whether an edit changed the scene in this tick (always so in the first), so that forced pairs, filters and plan
-    /// must be looked at again.
+    /// Returns whether an edit changed the scene in this tick (always in the first), so that forced pairs, filters and
+    /// plan must be updated.
     #[must_use]
     pub fn scene_changed(&self) -> bool {
         self.edited
     }
 
-    /// Slots of bodies that edits of this tick (the first: all) brought, changed or took out, or made free to move or
-    /// not; any number of times.
+    /// Slots of bodies that edits of this tick (the first: all) added, changed, removed, or made movable or fixed. May
+    /// contain duplicates.
     #[must_use]
     pub fn edited_slots(&self) -> &[BodySlot] {
         &self.touched
     }
 
-    /// The filters: which pairs are checked and reported. As of [`World::age`].
+    /// The filters: which pairs are checked and reported. Valid as of [`World::age`].
     #[must_use]
     pub fn filters(&self) -> &Filters {
         &self.filters
     }
 
-    /// Below which gap a pair is reported, metres.
+    /// Pairs with a smaller gap are reported, metres.
     #[must_use]
     pub fn report_within(&self, a: BodySlot, b: BodySlot) -> f64 {
         self.filters.report_within(a, b)
     }
 
-    /// How many pairs a rule, neighbour, rigid group or attachment ignores. As of [`World::age`].
+    /// Number of pairs ignored because of a rule, neighbour, rigid group or attachment. As of [`World::age`].
     #[must_use]
     pub fn ignored_pairs_count(&self) -> u64 {
         self.filters.ignored_pairs_count()
     }
 
-    /// Oldest and newest sender's stamp among the poses in use, nanoseconds; zeros where there is none. As of
+    /// Oldest and newest sender's stamp among the poses in use, nanoseconds; zeros if there are none. As of
     /// [`World::age`].
     #[must_use]
     pub fn stamps(&self) -> (u64, u64) {
         self.ages.stamps()
     }
 
-    /// Counts frames that were passed over because a newer one of their source was there, or that never came.
+    /// Counts frames that were skipped for a newer one of their source, or that never came.
     pub fn note_skipped(&mut self, source: SourceSlot, frames: u64) {
         if let Some(source) = self.sources.get_mut(source.index()) {
             source.skipped += frames;
         }
     }
 
-    /// The client that had this session is dead (its node is gone): it is over for whichever sources it speaks for, and
-    /// another may begin at once.
+    /// The client with this session is dead (its node is gone): the session is over for all its sources, and another
+    /// may begin at once.
     pub fn end_session(&mut self, session: u64) {
         for (place, state) in self.sources.iter_mut().enumerate() {
             if session != 0 && state.session == session {

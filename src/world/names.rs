@@ -1,7 +1,7 @@
-//! Names, for a boot: a dense number each, so that rules and neighbours never compare strings in a tick.
+//! Names, for a boot: a dense number for each, so that rules and neighbours never compare strings in a tick.
 //!
-//! In: names of bodies, parents and rules as they turn up. Out: their numbers, and what a name keeps when its body is
-//! removed and put again (id, generation). Names are never forgotten: an id stays with its name for a boot.
+//! In: names of bodies, parents and rules as they occur. Out: their numbers, and what a name keeps when its body is
+//! removed and put again (id, generation). Names are never dropped: an id stays with its name for a boot.
 
 use std::collections::BTreeMap;
 use std::ops::Bound;
@@ -24,31 +24,31 @@ impl NameId {
     }
 }
 
-/// What is kept of a name.
+/// Data kept for a name.
 #[derive(Clone, Debug)]
 pub(super) struct Name {
     pub(super) text: Box<str>,
-    /// The body's id, as soon as it ever had one.
+    /// The body's id, once it has had one.
     pub(super) id: Option<BodyId>,
-    /// Of the newest body of this name; 0: never put.
+    /// Generation of the newest body of this name; 0: never put.
     pub(super) generation: u32,
-    /// Where its body is now.
+    /// Slot of its body now.
     pub(super) slot: Option<BodySlot>,
 }
 
-/// All names met in this boot.
+/// All names that occurred in this boot.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Names {
     numbers: BTreeMap<Box<str>, NameId>,
     list: Vec<Name>,
-    /// Which name an id was given to.
+    /// The name that each id was given to.
     ids: BTreeMap<BodyId, NameId>,
     /// No id below this one is free.
     least_free: u64,
 }
 
 impl Names {
-    /// The number of a name, given when it is new.
+    /// The number of a name; a new name gets one.
     pub(super) fn intern(&mut self, text: &str) -> NameId {
         if let Some(&name) = self.numbers.get(text) {
             return name;
@@ -64,22 +64,22 @@ impl Names {
         name
     }
 
-    /// The number of a name that was met before.
+    /// The number of a known name.
     pub(super) fn find(&self, text: &str) -> Option<NameId> {
         self.numbers.get(text).copied()
     }
 
-    /// What is kept of a name that was met before.
+    /// The data of a known name.
     pub(super) fn find_name(&self, text: &str) -> Option<&Name> {
         self.find(text).map(|name| self.get(name))
     }
 
     /// The names that a plain name or a pattern matches, by text.
     ///
-    /// Cost: a search, and a short look at each name that begins as every match does.
+    /// Cost: a search, and a short test of each name with the same literal beginning.
     pub(super) fn matching<'a>(&'a self, pattern: &'a str) -> impl Iterator<Item = NameId> + 'a {
         let (head, tail) = literal_ends(pattern);
-        // A plain name is the first of those that begin with it, if it is there at all.
+        // A plain name is the first of those that begin with it, if it exists.
         let most = if is_pattern(pattern) { usize::MAX } else { 1 };
         self.numbers
             .range::<str, _>((Bound::Included(head), Bound::Unbounded))
@@ -105,12 +105,12 @@ impl Names {
         self.list.len()
     }
 
-    /// Which name has this id.
+    /// The name that has this id.
     pub(super) fn owner_of(&self, id: BodyId) -> Option<&Name> {
         self.ids.get(&id).map(|&name| self.get(name))
     }
 
-    /// Gives the name this id, or the one it has, or (`None`) the least that is free.
+    /// Gives the name this id, or keeps the one it has, or (`None`) gives it the least free one.
     pub(super) fn claim(&mut self, name: NameId, wanted: Option<BodyId>) -> BodyId {
         if let Some(id) = self.get(name).id {
             return id;
@@ -132,7 +132,7 @@ impl Names {
 }
 
 impl World {
-    /// The body that was most likely meant by a name that none has, to be told to who asked for it.
+    /// The existing name most similar to an unknown one, as a hint for the client.
     ///
     /// Cost: a comparison with each of the first [`NAMES_COMPARED_MAX`] names.
     pub(crate) fn name_meant(&self, name: &str) -> Option<&str> {

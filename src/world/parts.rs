@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::math::Pose;
 use crate::shape::{Geometry, ObbTree, Shape};
 
-/// A shape at its place in a body.
+/// A shape with its pose in a body.
 #[derive(Clone, Debug)]
 pub struct PlacedShape {
     /// Shared geometry.
@@ -16,8 +16,8 @@ pub struct PlacedShape {
 }
 
 impl PlacedShape {
-    /// Greatest distance of a number that it is told by from its body's origin, metres: of its points, or of where a
-    /// half-space stands.
+    /// Greatest distance of any of its defining coordinates from its body's origin, metres: of its points, or of a
+    /// half-space's plane.
     pub(crate) fn reach_m(&self) -> f64 {
         let own = match &self.shape.geometry {
             Geometry::HalfSpace { offset, .. } => offset.abs(),
@@ -29,42 +29,42 @@ impl PlacedShape {
     }
 }
 
-/// The shapes of a body in the scene's order: a slice of them. A clone shares them.
+/// The shapes of a body in the scene's order, as a slice. A clone shares them.
 #[derive(Clone, Debug)]
 pub struct Parts {
     shapes: Arc<[PlacedShape]>,
-    /// Of a body of several shapes.
+    /// For a body of several shapes.
     tree: Option<Arc<PartTree>>,
 }
 
 /// The tree over the shapes of a body.
 #[derive(Debug)]
 pub(crate) struct PartTree {
-    /// Boxes around the shapes, body frame; a leaf holds a shape by its place in the body. `None`: every shape is a
+    /// Boxes around the shapes, body frame; a leaf holds the index of a shape in the body. `None`: every shape is a
     /// half-space.
     pub(crate) boxes: Option<ObbTree>,
-    /// Places of the half-spaces, which fit into no box.
+    /// Indices of the half-spaces, which fit into no box.
     pub(crate) planes: Vec<u32>,
     /// Greatest [`PlacedShape::reach_m`].
     pub(crate) reach_m: f64,
 }
 
 impl Parts {
-    /// Builds the tree where there are several.
+    /// Builds the tree if there are several.
     ///
-    /// Cost: O(n log n), some 1 us a shape.
+    /// Cost: O(n log n), some 1 us per shape.
     #[must_use]
     pub fn new(shapes: Arc<[PlacedShape]>) -> Self {
         let tree = (shapes.len() > 1).then(|| Arc::new(PartTree::over(&shapes)));
         Self { shapes, tree }
     }
 
-    /// The tree over them; `None`: there is but one.
+    /// The tree over them; `None`: there is only one shape.
     pub(crate) fn tree(&self) -> Option<&PartTree> {
         self.tree.as_deref()
     }
 
-    /// The one shape of a body that deforms, to be changed; what others hold of it stays as it was.
+    /// The single shape of a body that deforms, mutable; other owners keep the old state.
     pub(super) fn only_mut(&mut self) -> Option<&mut PlacedShape> {
         match Arc::make_mut(&mut self.shapes) {
             [only] => Some(only),

@@ -1,13 +1,13 @@
-//! The path of a continuous body since the last tick: what lies between its poses, and the box around it.
+//! The path of a continuous body since the last tick: the motion between its poses, and the box around it.
 //!
 //! In: the pose of the last tick and each one admitted since. Out: legs from pose to pose, along which the pivot (the
-//! centre of the body's geometry; of an attached body that of the body it hangs on) goes straight and the body turns
-//! about a fixed axis at a constant rate; and a box that holds the body all the way.
+//! centre of the body's geometry; for an attached body that of the body it is attached to) moves straight and the body
+//! turns about a fixed axis at a constant rate; and a box that contains the whole motion.
 //!
 //! The share `s` of the motion runs from 0 (the last tick's pose) to 1 (this one's). The frames with poses that the
-//! body's source sent meanwhile divide it into equal parts, whether they hold the body or not: each leg takes the part
-//! of the frame that it ends at, and in all others the body stands still. So two bodies of one source are in step. Of
-//! two sources no part of the one is known to be a certain part of the other (see `narrow::sweep::in_step`).
+//! body's source sent meanwhile divide it into equal parts, whether they contain the body or not: each leg takes the
+//! part of the frame that it ends at, and in all other parts the body stands still. So two bodies of one source are in
+//! step. For two sources, parts of one cannot be matched with parts of the other (see `narrow::sweep::in_step`).
 
 use crate::ids::SourceSlot;
 use crate::limits::LEGS_MAX;
@@ -17,42 +17,42 @@ use super::leg::{Leg, swept_box, turn_of};
 use super::parts::PlacedShape;
 use super::place::tight_box;
 
-/// How far a body's surface is from its pivot, and what the scene says of its motion.
+/// The path of a body, the distance of its surface from its pivot, and what the scene says about its motion.
 #[derive(Clone, Debug)]
 pub struct Path {
     legs: Vec<Leg>,
-    /// Whose frames it follows.
+    /// The source whose frames it follows.
     source: Option<SourceSlot>,
-    /// How many frames with poses that source sent in this tick.
+    /// Number of frames with poses that this source sent in this tick.
     frames: u32,
-    /// A tick, and which of its frames had the body's first pose, which no leg leads to; 0: none.
+    /// A tick, and which of its frames had the body's first pose, which ends no leg; 0: none.
     entered: (u64, u32),
-    /// Body frame.
+    /// The pivot, body frame.
     pivot: Point,
     /// Greatest distance of the body's surface from the pivot, metres, rounded up.
     reach: f64,
     /// Steps of the body's centre beyond it are teleports, metres.
     teleport_m: f64,
-    /// Whether the body itself is swept; else its path is kept for what hangs on it.
+    /// Whether the body itself is swept; otherwise its path is kept for bodies attached to it.
     swept: bool,
-    /// Its end is where a velocity leads, and no pose that was sent.
+    /// Its end was predicted from a velocity; no pose was sent for it.
     ahead: bool,
-    /// The body is not in the broad phase now: its way counts for what hangs on it alone.
+    /// The body is not in the broad phase now: its path only matters to bodies attached to it.
     pub(super) aside: bool,
-    /// Not every pose found room: only the box knows of the rest.
+    /// Not every pose fitted: the rest is covered only by the box.
     blurred: bool,
-    /// Holds the body at the newest pose.
+    /// Contains the body at the newest pose.
     end: Aabb,
-    /// Holds it all the way.
+    /// Contains the body along the whole path.
     hull: Aabb,
-    /// Holds the pivot all the way, also where legs found no room.
+    /// Contains the pivot along the whole path, including legs that did not fit.
     pivots: Aabb,
 }
 
 impl Path {
-    /// Of a body at rest.
+    /// For a body at rest.
     ///
-    /// * `radius` - of a ball about `pivot` that holds the body, metres.
+    /// * `radius` - of a ball around `pivot` that contains the body, metres.
     pub(super) fn new(pivot: Point, radius: f64, teleport_m: Option<f64>, swept: bool) -> Self {
         Self {
             legs: Vec::with_capacity(LEGS_MAX),
@@ -72,7 +72,7 @@ impl Path {
         }
     }
 
-    /// Of one leg, of a body that is asked for.
+    /// A path of one leg, for a query.
     pub(super) fn of_leg(leg: Leg, pivot: Point, radius: f64) -> Self {
         Self {
             legs: vec![leg],
@@ -88,19 +88,19 @@ impl Path {
         &self.legs
     }
 
-    /// Whose frames it follows.
+    /// The source whose frames it follows.
     #[must_use]
     pub fn source(&self) -> Option<SourceSlot> {
         self.source
     }
 
-    /// How many frames with poses that source sent in this tick: parts of equal length that the share consists of.
+    /// Number of frames with poses that this source sent in this tick: the number of equal parts of the share.
     #[must_use]
     pub fn frames(&self) -> u32 {
         self.frames
     }
 
-    /// Says whose frames it follows and how many there were in a tick.
+    /// Sets the source whose frames it follows and their number in a tick.
     pub(super) fn set_frames(&mut self, source: Option<SourceSlot>, frames: u32, tick: u64) {
         let last = self.legs.last().map_or(1, |leg| leg.frame);
         (self.source, self.frames) = (source, frames.max(last));
@@ -109,13 +109,13 @@ impl Path {
         }
     }
 
-    /// Whether a pose of the body came with a frame, by number in this tick, as its first one: no leg ends there.
+    /// Returns whether the body's first pose came with this frame, by number in this tick: no leg ends there.
     #[must_use]
     pub fn has_entered_with(&self, frame: u32) -> bool {
         self.entered.1 == frame && frame != 0
     }
 
-    /// Begins anew where the body is, with a first pose.
+    /// Starts again at the body's place, with a first pose.
     ///
     /// * `entered` - the tick, and which of its frames had that pose.
     pub(super) fn enter(&mut self, end: Aabb, entered: (u64, u32)) {
@@ -123,7 +123,7 @@ impl Path {
         self.entered = entered;
     }
 
-    /// The point that goes straight, body frame.
+    /// The point that moves straight, body frame.
     #[must_use]
     pub fn pivot(&self) -> &Point {
         &self.pivot
@@ -135,48 +135,48 @@ impl Path {
         self.reach
     }
 
-    /// Whether the body was told to be where a share of a leg puts it: at its ends, but for one that was worked out.
+    /// Returns whether the pose at a share of a leg was reported: at its ends, except a predicted one.
     #[must_use]
     pub fn is_told_at(&self, share: f64) -> bool {
         share <= 0.0 || (share >= 1.0 && !self.ahead)
     }
 
-    /// Whether more poses came than are kept: the legs do not tell the whole way.
+    /// Returns whether more poses came than are kept: the legs do not cover the whole path.
     #[must_use]
     pub fn is_blurred(&self) -> bool {
         self.blurred
     }
 
-    /// Whether the body is to be asked for on the way: it is continuous and did not stand still.
+    /// Returns whether the path must be swept: the body is continuous and did not stand still.
     #[must_use]
     pub fn is_swept(&self) -> bool {
         self.counts() && self.has_moved()
     }
 
-    /// Whether the body is continuous; else its path is kept for what hangs on it.
+    /// Returns whether the body is continuous; otherwise its path is kept for bodies attached to it.
     #[must_use]
     pub fn is_of_continuous(&self) -> bool {
         self.swept
     }
 
-    /// Whether there is a step of which nothing is asked.
+    /// Returns whether a step of it is not swept.
     #[must_use]
     pub fn has_jumped(&self) -> bool {
         self.counts() && self.legs.iter().any(|leg| leg.jump)
     }
 
-    /// Whether a step of it was beyond its `teleport_m`.
+    /// Returns whether a step of it exceeded its `teleport_m`.
     #[must_use]
     pub fn has_teleported(&self) -> bool {
         self.counts() && self.legs.iter().any(|leg| leg.jump && !leg.lapse)
     }
 
-    /// Whether it is the way of a body that is continuous and takes part.
+    /// Returns whether it is the path of a continuous body in the broad phase.
     fn counts(&self) -> bool {
         self.swept && !self.aside
     }
 
-    /// Says whether the body is out of the broad phase: what it went meanwhile is no motion of its own.
+    /// Sets whether the body is out of the broad phase: what it moved meanwhile is no motion of its own.
     pub(super) fn set_aside(&mut self, aside: bool) {
         if self.aside && !aside {
             self.enter(self.end, self.entered);
@@ -184,13 +184,13 @@ impl Path {
         self.aside = aside;
     }
 
-    /// A box that holds the body all the way.
+    /// A box that contains the body along the whole path.
     #[must_use]
     pub fn hull(&self) -> &Aabb {
         &self.hull
     }
 
-    /// Begins anew where the body is.
+    /// Starts again at the body's place.
     pub(super) fn restart(&mut self, end: Aabb) {
         self.legs.clear();
         self.entered = (0, 0);
@@ -199,14 +199,14 @@ impl Path {
         self.pivots = Aabb::empty();
     }
 
-    /// As [`Path::restart`], at the newest pose; whether the hull was wider.
+    /// As [`Path::restart`], at the newest pose; returns whether the hull was wider.
     pub(super) fn rest(&mut self) -> bool {
         let wider = self.hull != self.end;
         self.restart(self.end);
         wider
     }
 
-    /// Takes the box of other vertices at the newest pose.
+    /// Takes the box of changed vertices at the newest pose.
     pub(super) fn take_end(&mut self, end: Aabb) {
         self.end = end;
         self.hull = if self.is_empty() {
@@ -229,9 +229,9 @@ impl Path {
         (self.pivot, self.reach) = (pivot, radius);
     }
 
-    /// Adds the way to a new pose; whether the hull grew.
+    /// Adds the leg to a new pose; returns whether the hull grew.
     ///
-    /// * `declared` - angular velocity times the time since the last pose, scene frame, where the sender says both.
+    /// * `declared` - angular velocity times the time since the last pose, scene frame, if the sender gives both.
     /// * `end` - box of the body at the new pose.
     /// * `frame` - number of the frame that the new pose is from, in this tick.
     pub(super) fn push(
@@ -258,7 +258,7 @@ impl Path {
         self.add(leg, end, !followed)
     }
 
-    /// Adds the first pose after a reset to the way before it, which was gone and is asked for; whether the hull grew.
+    /// Adds the first pose after a reset to the path before it, which is still swept; returns whether the hull grew.
     pub(super) fn lapse(&mut self, (from, to): (Pose, Pose), end: Aabb, frame: u32) -> bool {
         let (at, goal) = (from * self.pivot, to * self.pivot);
         let leg = Leg {
@@ -275,12 +275,12 @@ impl Path {
         self.add(leg, end, false)
     }
 
-    /// Whether it has gone anywhere in this tick.
+    /// Returns whether it has moved in this tick.
     pub(super) fn has_moved(&self) -> bool {
         self.blurred || self.legs.iter().any(|leg| !leg.is_still())
     }
 
-    /// Adds a leg; whether the hull grew.
+    /// Adds a leg; returns whether the hull grew.
     fn add(&mut self, leg: Leg, end: Aabb, blurred: bool) -> bool {
         let before = self.hull;
         self.hull = if leg.jump || !self.counts() {
@@ -302,10 +302,10 @@ impl Path {
         self.hull != before
     }
 
-    /// Takes the path of the body it hangs on.
+    /// Takes the path of the body it is attached to.
     ///
-    /// * `local` - its pose seen from there.
-    /// * `centre` - of its own, whose steps may be teleports; body frame, metres.
+    /// * `local` - its pose relative to that body.
+    /// * `centre` - its own centre, whose steps may be teleports; body frame, metres.
     /// * `end` - its box at the newest pose.
     pub(super) fn follow(
         &mut self,
@@ -335,7 +335,7 @@ impl Path {
         self.end = end;
         self.blurred = root.blurred;
         if root.blurred && self.swept {
-            // Legs that found no room: it was no farther than this from where the pivot was.
+            // Legs that did not fit: it was no farther than this from the places of the pivot.
             let pivots = &root.pivots;
             let far = pivots.min.coords.amax().max(pivots.max.coords.amax());
             let reach = self.reach + 64.0 * ROUND * (self.reach + far);

@@ -1,4 +1,4 @@
-//! What was refused: counted by reason, with the source that the last of each reason was of.
+//! Refused input: counted by reason, with the source of the last refusal for each reason.
 
 use super::World;
 use crate::ids::{BodyId, BodySlot, SourceSlot};
@@ -9,9 +9,9 @@ use crate::wire::{REJECTS_LEN, RejectReason, SOURCE_NAME_LEN, name_str};
 pub(super) struct Refusals {
     counts: [u64; REJECTS_LEN],
     last: [Option<SourceSlot>; REJECTS_LEN],
-    /// The body whose pose or vertices were refused last, by reason; `None`: a frame was.
+    /// The body whose pose or vertices were refused last, by reason; `None`: it was a frame.
     bodies: [Option<BodyId>; REJECTS_LEN],
-    /// The name that the last frame of no source of the scene had.
+    /// The source name in the last frame from an unknown source.
     stranger: [u8; SOURCE_NAME_LEN],
 }
 
@@ -22,8 +22,8 @@ impl World {
         &self.refusals.counts
     }
 
-    /// The source of which something was refused last for a reason, as far as that is known; of frames of no source of
-    /// the scene the name that they have.
+    /// The source of the last refusal for a reason, as far as known; for frames from an unknown source the name in
+    /// them.
     #[must_use]
     pub fn refused_of(&self, reason: RejectReason) -> Option<&str> {
         let refusals = &self.refusals;
@@ -36,7 +36,7 @@ impl World {
 
     /// Counts a refusal.
     ///
-    /// * `source` - whose; `None`: of no source of the scene, or not known.
+    /// * `source` - the sender; `None`: not a source of the scene, or unknown.
     pub fn note_reject(&mut self, reason: RejectReason, source: Option<SourceSlot>) {
         let place = usize::from(reason.code());
         self.refusals.counts[place] += 1;
@@ -44,12 +44,13 @@ impl World {
         self.refusals.bodies[place] = None;
     }
 
-    /// Notes whose pose or vertices the refusal was of that was counted last for a reason.
+    /// Records the body whose pose or vertices caused the last counted refusal for a reason.
     pub(super) fn note_refused_body(&mut self, reason: RejectReason, slot: BodySlot) {
         self.refusals.bodies[usize::from(reason.code())] = self.body(slot).map(|body| body.id);
     }
 
-    /// The body whose pose or vertices were refused last for a reason, if it is there still and no frame was since.
+    /// The body whose pose or vertices were refused last for a reason, if it still exists and no frame was refused
+    /// since.
     #[must_use]
     pub fn refused_body(&self, reason: RejectReason) -> Option<&str> {
         let id = self.refusals.bodies[usize::from(reason.code())]?;

@@ -1,21 +1,21 @@
-//! Tags: the little that publishing asks of both bodies of every pair, side by side.
+//! Tags: the few data of both bodies of every pair that publishing needs, in one array.
 //!
-//! In: what the world settles of a body. Out: sixteen bytes a body, which stay in the cache where the bodies themselves
-//! (some hundred times as large a memory, met in no order) do not.
+//! In: the settled state of a body. Out: sixteen bytes per body, which stay in the cache; the bodies themselves (some
+//! hundred times as much memory, accessed in random order) do not.
 
 use super::body::Body;
 use crate::ids::{BodyId, BodySlot};
 use crate::wire::BodyStatus;
 
-/// A body in few words.
+/// The essential data of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tag {
     /// Its id.
     pub id: BodyId,
     /// What is known of its place.
     pub status: BodyStatus,
-    /// Whether the velocity of its surface is known: told by its sender, or none because it cannot move. Of what
-    /// deforms nobody tells how its vertices go.
+    /// Whether the velocity of its surface is known: given by its sender, or zero because it cannot move. For a body
+    /// that deforms the velocities of its vertices are unknown.
     pub has_velocity: bool,
 }
 

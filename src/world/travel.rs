@@ -1,10 +1,10 @@
-//! Continuous bodies on their way: poses become legs of a path, and the path a box; in the next tick the box is tight
+//! Motion of continuous bodies: poses become legs of a path, and the path a box; in the next tick the box is tight
 //! again.
 //!
-//! In: admitted poses, and what the sender says of the spin. Out: paths of bodies and of what hangs on them. A body
-//! that was not in the broad phase in the last pose has no path of its own: a first pose, one after a reset, an edit
-//! are no motion, and what lay before a reset in the same tick is one. What hangs on it may take part all the same, and
-//! goes its way.
+//! In: admitted poses, and the spin that the sender gives. Out: paths of bodies and of bodies attached to them. A body
+//! that was not in the broad phase with its last pose has no path of its own: a first pose, one after a reset, or an
+//! edit are no motion; but the motion before a reset in the same tick is. Bodies attached to it may take part
+//! nevertheless, and follow its path.
 
 use super::World;
 use super::path::Path;
@@ -20,7 +20,7 @@ impl World {
         &self.travelled
     }
 
-    /// Whether a continuous body's step in this tick was a teleport by what the scene says.
+    /// Returns whether a step of a continuous body in this tick was a teleport by the scene's limit.
     #[must_use]
     pub fn has_teleported(&self) -> bool {
         let path = |slot: &BodySlot| self.body(*slot)?.path.as_ref();
@@ -30,7 +30,7 @@ impl World {
             .any(|path| path.has_teleported())
     }
 
-    /// All frames are there: each way learns how many its source sent.
+    /// After all frames: sets in each path how many frames its source sent.
     pub(super) fn count_frames(&mut self) {
         for at in 0..self.travelled.len() {
             let slot = self.travelled[at];
@@ -44,7 +44,7 @@ impl World {
         }
     }
 
-    /// A tick begins: what lay before it has been told, boxes are tight again.
+    /// A tick begins: earlier motion has been reported, boxes are tight again.
     pub(super) fn end_travels(&mut self) {
         for source in &mut self.sources {
             source.pose_frames = 0;
@@ -71,9 +71,9 @@ impl World {
         self.bar_lost();
     }
 
-    /// As [`World::place`], for a pose that a frame has: a continuous body goes there.
+    /// As [`World::place`], for a pose from a frame: a continuous body moves there.
     ///
-    /// * `declared` - its angular velocity times the time since its last pose, where the sender says both.
+    /// * `declared` - its angular velocity times the time since its last pose, if the sender gives both.
     /// * returns - whether pose or box changed.
     pub(super) fn travel(&mut self, slot: BodySlot, pose: &Pose, declared: Option<Vec3>) -> bool {
         let Some((from, path)) = self.take_path(slot) else {
@@ -91,7 +91,7 @@ impl World {
         })
     }
 
-    /// As [`World::place`], for a body that hangs on another: a continuous one goes the other's way.
+    /// As [`World::place`], for an attached body: a continuous one follows the path of the body it is attached to.
     pub(super) fn place_attached(&mut self, slot: BodySlot, pose: &Pose) -> bool {
         let Some((_, path)) = self.take_path(slot) else {
             return self.place(slot, pose);
@@ -102,9 +102,9 @@ impl World {
         let body = self
             .body(slot)
             .map(|body| (body.shapes.clone(), body.centre));
-        // Taken out for the loan, and put back.
+        // Taken out for the borrow, and put back.
         let of_root = self.take_path(root);
-        // Where the other has gone since its first pose of this tick this one has gone, too: it is settled later.
+        // If the other has moved since its first pose of this tick, so has this one; it is settled later.
         let root_is_disabled = !self.entries[root.index()].enabled;
         let has_gone = |path: &Path| !path.is_empty() && (!path.aside || root_is_disabled);
         let goes = self.entries[slot.index()].enabled
@@ -125,7 +125,7 @@ impl World {
         moved
     }
 
-    /// Whether a body has a pose that another one is a motion from.
+    /// Returns whether a body has a pose from which another one is a motion.
     fn is_placed(&self, slot: BodySlot) -> bool {
         let entry = &self.entries[slot.index()];
         self.body(slot).is_some_and(|body| body.in_broad) || entry.root == slot && entry.has_pose
@@ -136,11 +136,11 @@ impl World {
         Some((body.pose, body.path.take()?))
     }
 
-    /// Gives a placed body its path back, with what `go` adds to it; whether pose or box changed.
+    /// Gives a placed body its path back, extended by `go`; returns whether pose or box changed.
     ///
-    /// * `goes` - whether it has gone where `go` says, though it is not in the broad phase yet.
+    /// * `goes` - whether it has moved as `go` says, although it is not in the broad phase yet.
     /// * `frame` - number of the frame that the pose is from, in this tick; 0: of another body.
-    /// * `go` - given the path, the box at its new end, and whether what lies between is no motion.
+    /// * `go` - called with the path, the box at its new end, and whether the step is no motion.
     fn lay(
         &mut self,
         slot: BodySlot,
@@ -150,14 +150,14 @@ impl World {
     ) -> bool {
         let placed = self.is_placed(slot) || goes;
         let is_out = !(goes || self.body(slot).is_some_and(|body| body.in_broad));
-        // After a reset the way of this tick goes on behind a lapse, also where the body does not take part since: what
-        // was touched on it before is told.
+        // After a reset the path of this tick continues after a lapse, even if the body does not take part since: what
+        // it touched before is reported.
         let lapses = path.has_moved() && (!placed || is_out && !path.aside);
         let entry = &mut self.entries[slot.index()];
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return moved;
         };
-        // Where it was placed, its box is new and tight.
+        // If it was placed, its box is new and tight.
         let end = if moved { entry.tight } else { *path.end() };
         if !lapses {
             path.set_aside(is_out);
@@ -178,7 +178,7 @@ impl World {
         moved || grown
     }
 
-    /// A body stands where an edit put it: that is no way.
+    /// An edit placed the body: that is no motion.
     pub(super) fn forget_way(&mut self, slot: BodySlot) {
         let entry = &mut self.entries[slot.index()];
         if let Some(body) = self.bodies[slot.index()].as_mut()
@@ -189,14 +189,14 @@ impl World {
         }
     }
 
-    /// Sees to it that continuous bodies that hang on another turn about its centre, and that it keeps its way for
-    /// them; and notes whose frames move any.
+    /// Makes continuous bodies that are attached to another turn about its centre, makes that body keep its path for
+    /// them, and marks the sources whose frames move any.
     pub(super) fn link_paths(&mut self) {
         for source in &mut self.sources {
             source.followed = false;
         }
         let mut at = 0;
-        // It grows by those that something continuous hangs on.
+        // Grows by bodies that something continuous is attached to.
         while let Some(&slot) = self.pathed.get(at) {
             at += 1;
             let index = slot.index();
@@ -233,7 +233,7 @@ impl World {
         }
     }
 
-    /// Notes that the frames of a body's source move it, where it is continuous.
+    /// Marks that the frames of a body's source move it, if it is continuous.
     fn note_followed(&mut self, slot: BodySlot, root: BodySlot) {
         let path = self.body(slot).and_then(|body| body.path.as_ref());
         if path.is_some_and(|path| path.is_of_continuous())

@@ -1,13 +1,13 @@
-//! Trees of bodies that deform, built anew off the tick.
+//! Trees of bodies that deform, rebuilt outside the tick.
 //!
-//! In: the wear of a tree. Out: a job that holds all it needs, for a worker; what it made goes in between two ticks.
+//! In: the wear of a tree. Out: a self-contained job for a worker; its result is put in place between two ticks.
 
 use super::bend::{Unbuilt, Vertices};
 use super::{Body, World};
 use crate::ids::BodyId;
 use crate::shape::{NewTree, TreeJob};
 
-/// Times that the wait for a tree that cannot be built is doubled, at most.
+/// How often the wait for a tree that cannot be built is doubled, at most.
 const DOUBLINGS_MAX: u32 = 16;
 
 /// A tree to be built.
@@ -17,7 +17,7 @@ pub struct WornTree {
     job: TreeJob,
 }
 
-/// Of which body, and which of its vertices.
+/// The body, and the version of its vertices.
 #[derive(Clone, Copy, Debug)]
 pub struct TreeOf {
     body: BodyId,
@@ -25,7 +25,7 @@ pub struct TreeOf {
     updates: u64,
 }
 
-/// One that was.
+/// A tree that was built.
 #[derive(Clone, Debug)]
 pub struct BuiltTree {
     of: TreeOf,
@@ -33,7 +33,7 @@ pub struct BuiltTree {
 }
 
 impl TreeOf {
-    /// The body's id and generation, and how many updates of its vertices there were.
+    /// The body's id and generation, and the number of updates of its vertices.
     #[must_use]
     pub fn parts(self) -> (BodyId, u32, u64) {
         (self.body, self.generation, self.updates)
@@ -41,7 +41,7 @@ impl TreeOf {
 }
 
 impl BuiltTree {
-    /// What it is of.
+    /// What it was built for.
     #[must_use]
     pub fn of(&self) -> TreeOf {
         self.of
@@ -49,7 +49,7 @@ impl BuiltTree {
 }
 
 impl WornTree {
-    /// What it is of, for [`World::refuse_tree`] when it cannot be built.
+    /// What it is for; for [`World::refuse_tree`] when it cannot be built.
     #[must_use]
     pub fn of(&self) -> TreeOf {
         self.of
@@ -64,7 +64,7 @@ impl WornTree {
         }
     }
 
-    /// The same with a face of no vertices: it cannot be built.
+    /// The same with an invalid face: it cannot be built.
     #[cfg(test)]
     pub(crate) fn spoil(mut self) -> Self {
         self.job.spoil();
@@ -73,10 +73,10 @@ impl WornTree {
 }
 
 impl World {
-    /// A copy of what a worker needs to build the tree anew of a body that has deformed far from the shape its tree was
-    /// built for; `None`: no tree is worn, or none but those that could not be built of these vertices.
+    /// A copy of what a worker needs to rebuild the tree of a body that has deformed far from the shape its tree was
+    /// built for; `None`: no tree is worn, except those that could not be built from these vertices.
     ///
-    /// Cost: nothing to speak of for each body that deforms; of one that is worn, a copy of its vertices and faces.
+    /// Cost: negligible for each body that deforms; for a worn one, a copy of its vertices and faces.
     #[must_use]
     pub fn worn_tree(&self) -> Option<WornTree> {
         let all = self.deforming.iter();
@@ -84,14 +84,14 @@ impl World {
             .find_map(Body::worn_tree)
     }
 
-    /// The same of one body alone: where boxes were refitted within a limit of time, which tree wears first is the
-    /// machine's choice.
+    /// The same for one body: where boxes are refitted within a time limit, which tree wears first depends on the
+    /// machine.
     #[must_use]
     pub fn worn_tree_of(&self, body: BodyId) -> Option<WornTree> {
         self.body(self.slot_of(body)?)?.worn_tree()
     }
 
-    /// Puts a tree in place, between two ticks. Whether it was taken: its body may be another by now.
+    /// Puts a tree in place, between two ticks. Returns whether it was taken: the body may be another by now.
     pub fn take_tree(&mut self, built: BuiltTree) -> bool {
         let shape = self.bent_body(built.of).and_then(Body::bending_shape);
         let taken = shape.is_some_and(|shape| shape.take_tree(built.tree));
@@ -104,10 +104,10 @@ impl World {
         taken
     }
 
-    /// A tree could not be built: its boxes are refitted as before, and it is not asked for again until the body has
-    /// other vertices, nor then, if that fails too, until twice as many updates later each time.
+    /// A tree could not be built: its boxes are refitted as before, and the tree is not requested again until the body
+    /// has other vertices; after each further failure the wait doubles, in updates.
     ///
-    /// * returns - the body's name when this is the first time since it was put or a tree of it was built: to be told.
+    /// * returns - the body's name if this is the first time since it was put or its tree was built: to be reported.
     pub fn refuse_tree(&mut self, of: TreeOf) -> Option<String> {
         let body = self.bent_body(of)?;
         let vertices = body.vertices.as_mut()?;
@@ -141,7 +141,7 @@ impl Body {
 }
 
 impl Vertices {
-    /// Whether a tree may be asked for.
+    /// Returns whether a tree may be requested.
     fn can_be_built(&self) -> bool {
         (self.unbuilt).is_none_or(|unbuilt| self.updates >= unbuilt.until)
     }

@@ -1,7 +1,7 @@
-//! The cells and who stands in each: a list a cell, its links in one pool.
+//! The cells and the bodies in each: one list per cell, with all links in one pool.
 //!
-//! Cells stand in an array, or, where the world has no end, in a pool that a table finds by their coordinates; there a
-//! cell without a body is given back at once.
+//! Cells are stored in an array, or, for unbounded space, in a pool that a table indexes by their coordinates; there a
+//! cell without a body is freed at once.
 
 use crate::ids::{BodySlot, small};
 use crate::pairs::Index;
@@ -24,7 +24,7 @@ struct Link {
 /// A cell.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cell {
-    /// Power of two of its side, and where it is.
+    /// Power of two of its side, and its coordinates.
     pub(super) power: i32,
     pub(super) at: [i64; 3],
     pub(super) first: u32,
@@ -55,7 +55,7 @@ impl Default for Cells {
     }
 }
 
-/// Mixes power and coordinates: odd constants, each coordinate its own (Teschner et al. 2003 use primes).
+/// Mixes power and coordinates with odd constants, one per coordinate (Teschner et al. 2003 use primes).
 fn hash(power: i32, at: [i64; 3]) -> u64 {
     let mut mixed = u64::from(power.unsigned_abs());
     for (part, by) in at.into_iter().zip([
@@ -69,7 +69,7 @@ fn hash(power: i32, at: [i64; 3]) -> u64 {
 }
 
 impl Cells {
-    /// Drops all; in an array of this shape from now on, or in a table.
+    /// Drops everything; from now on in an array of this shape, or in a table.
     pub(super) fn clear(&mut self, shape: Option<[i64; 3]>) {
         self.shape = shape;
         self.links.clear();
@@ -88,7 +88,7 @@ impl Cells {
         }
     }
 
-    /// Where a cell is kept.
+    /// Index of a cell.
     fn find(&self, power: i32, at: [i64; 3]) -> Option<u32> {
         if let Some([x, y, _]) = self.shape {
             return u32::try_from(at[0] + x * (at[1] + y * at[2])).ok();
@@ -102,7 +102,7 @@ impl Cells {
     /// Puts a body into a cell.
     ///
     /// * `sibling` - the body's last link, or `NONE`.
-    /// * returns - this one.
+    /// * returns - the new link.
     pub(super) fn link(&mut self, power: i32, at: [i64; 3], body: BodySlot, sibling: u32) -> u32 {
         let cell = self.find(power, at).unwrap_or_else(|| self.open(power, at));
         let next = self.cells[cell as usize].first;
@@ -128,7 +128,7 @@ impl Cells {
         place
     }
 
-    /// Makes a cell of the table.
+    /// Adds a cell to the table.
     fn open(&mut self, power: i32, at: [i64; 3]) -> u32 {
         let first = NONE;
         let cell = Cell { power, at, first };
@@ -144,7 +144,7 @@ impl Cells {
         place
     }
 
-    /// Takes a body out of all its cells.
+    /// Removes a body from all its cells.
     ///
     /// * `link` - its last link, or `NONE`.
     pub(super) fn unlink(&mut self, link: u32) {
@@ -177,7 +177,7 @@ impl Cells {
         }
     }
 
-    /// Who stands in a cell.
+    /// The bodies in a cell.
     pub(super) fn bodies(&self, power: i32, at: [i64; 3]) -> impl Iterator<Item = BodySlot> + '_ {
         let cell = self.find(power, at);
         let first = cell.and_then(|cell| self.cells.get(cell as usize));
@@ -191,7 +191,7 @@ impl Cells {
 
     /// Checks lists, free links, and that the table holds no empty cell.
     ///
-    /// * returns - how many bodies stand in how many cells, counted by cell.
+    /// * returns - number of links between bodies and cells, counted by cell.
     pub(super) fn validate(&self) -> Result<usize, String> {
         let mut seen = 0;
         for (place, cell) in self.cells.iter().enumerate() {

@@ -1,17 +1,17 @@
-//! From boxes to cells: a place's cell grows with the place, so boxes that share a point share a cell, whatever
-//! rounding does.
+//! From boxes to cells: the cell index is monotonic in the coordinate, so boxes that share a point share a cell,
+//! whatever rounding does.
 
 use crate::broad::members::Bounds;
 
-/// Levels: cells from 2^-40 to 2^60 metres; smaller and larger boxes stand at the ends.
+/// Levels: cells from 2^-40 to 2^60 metres; smaller and larger boxes use the first or last level.
 const POWERS: std::ops::RangeInclusive<i32> = -40..=60;
-/// Most cells of an array, a body, and some: beyond it the cells are larger than the largest box needs.
+/// Most cells of an array, per body, plus a few; beyond that the cells are made larger than the largest box needs.
 const CELLS_A_BODY: f64 = 4.0;
 /// See [`CELLS_A_BODY`].
 const CELLS_LEAST: f64 = 64.0;
 /// Cells on one axis at most, so that their numbers are exact.
 const CELLS_AN_AXIS: f64 = 1_099_511_627_776.0;
-/// A box as large as a cell covers two on each axis; this much more than the box, rounding does not add a third.
+/// A box as large as a cell covers two on each axis; with cells larger by this factor, rounding does not add a third.
 const ROOM: f64 = 1.0 + 1e-6;
 
 /// The least power of two above a box's longest side: its level.
@@ -42,7 +42,7 @@ impl Lattice {
 
     /// Cells as large as the largest finite box.
     ///
-    /// * `bodies` - where the cells stand in an array, for so many bodies: then they are so large that it has room.
+    /// * `bodies` - number of bodies, if the cells are in an array: the cells are then made large enough for it.
     pub(super) fn around<'a>(
         boxes: impl Iterator<Item = &'a Bounds>,
         bodies: Option<usize>,
@@ -102,7 +102,7 @@ impl Lattice {
     }
 }
 
-/// Cells from a lowest to a highest, both in it.
+/// Cells from a lowest to a highest, both included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Range {
     low: [i64; 3],
@@ -116,14 +116,14 @@ impl Range {
         high: [-1; 3],
     };
 
-    /// How many cells.
+    /// Number of cells.
     pub(super) fn len(&self) -> u64 {
         let side = |k: usize| self.high[k].saturating_sub(self.low[k]).saturating_add(1);
         let side = |k: usize| u64::try_from(side(k)).unwrap_or(0);
         side(0).saturating_mul(side(1)).saturating_mul(side(2))
     }
 
-    /// What is left of it in an array; what lies beyond falls on the edge.
+    /// The range clamped to an array; cells beyond fall on the edge.
     pub(super) fn clamped(&self, shape: [i64; 3]) -> Self {
         let clamp = |cell: [i64; 3]| std::array::from_fn(|k| cell[k].clamp(0, shape[k] - 1));
         Self {
@@ -142,7 +142,7 @@ impl Range {
         })
     }
 
-    /// The lowest cell that is in both of two ranges that share one.
+    /// The lowest cell that is in both ranges; they must share one.
     pub(super) fn lower_shared(&self, other: &Self) -> [i64; 3] {
         std::array::from_fn(|k| self.low[k].max(other.low[k]))
     }

@@ -1,17 +1,17 @@
-//! Grids: bodies stand in the cells that their boxes cover, kept across ticks.
+//! Grids: each body is linked to the cells that its box covers, kept across ticks.
 //!
-//! In: who left, came, moved. Out: pairs that may have begun. Three methods that differ in two things:
+//! In: bodies that left, came, moved. Out: pairs that may have begun. Three methods that differ in two ways:
 //!
 //! | method | size of a cell | where cells are kept |
 //! | --- | --- | --- |
 //! | uniform grid | one for all: the largest box, so that a box covers up to 8 cells | an array over the scene |
-//! | spatial hash | the same | a table of the cells in use: the world has no end, an empty cell takes no memory |
-//! | hierarchical grid | a level by size, a factor of two between levels: a box covers up to 8 cells of its own | a table |
+//! | spatial hash | the same | a table of the cells in use: unbounded space, an empty cell takes no memory |
+//! | hierarchical grid | levels by size, a factor of two apart: a box covers up to 8 cells of its level | a table |
 //!
-//! A body is linked anew only where its cells changed. A moved body asks the cells that its box covers, on each level
-//! that has any body; a level with fewer bodies than cells to ask is gone through body by body, so that a floor does
-//! not ask a million cells for a few pebbles. A pair is told in the cell of the lower corner of what two boxes share.
-//! Boxes without end cover no cells: they are compared with all.
+//! A body is linked again only when its cells changed. A moved body queries the cells that its box covers, on each
+//! level that has any body; a level with fewer bodies than cells to query is scanned body by body, so that a floor does
+//! not query a million cells for a few pebbles. A pair is reported in only one cell, that of the lower corner of the
+//! intersection of the two boxes. Infinite boxes cover no cells: they are compared with all.
 //!
 //! Sources: RTR3 section 17.5.2 (uniform grids, spatial hashing); Mirtich 1996, Ericson 2005 section 7.2 (levels by
 //! size).
@@ -27,7 +27,7 @@ mod validate;
 use cells::{Cells, NONE};
 use lattice::{Lattice, Range, level_of};
 
-/// Which of the three.
+/// Which of the three grids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// One size of cells, in an array.
@@ -38,23 +38,24 @@ pub(super) enum Kind {
     Levels,
 }
 
-/// Most cells that a box stands in; with more it is compared with all. Its own cells are 8, and rounding may add some.
+/// Most cells that a box is linked to; a box with more is compared with all. It covers 8, and rounding may add some.
 const COVERED_MAX: u64 = 64;
-/// Bodies placed at the edge of the array because they lie beyond it, one in so many, until it is laid out anew.
+/// When one in `STRAYED` bodies was placed at the edge of the array because it lies beyond, the array is laid out
+/// again.
 const STRAYED: usize = 8;
-/// So many times as many bodies as the array was laid out for, and it is laid out anew.
+/// The array is laid out again when there are `GROWN` times as many bodies as it was laid out for.
 const GROWN: usize = 2;
-/// Cells twice as large as the largest box needs are laid out anew; looked at when so many boxes a body were placed.
+/// Cells are laid out again when this much larger than the largest box needs; checked after one placement per body.
 const SHRINK: f64 = 2.0;
 
-/// Where a body stands.
+/// Where a body is linked.
 #[derive(Clone, Copy, Debug)]
 struct Stand {
-    /// Its cells; empty where it stands in none.
+    /// Its cells; empty when it is linked to none.
     range: Range,
-    /// Place of its level in `levels`, or `NONE`: it is compared with all, or not in.
+    /// Index of its level in `levels`, or `NONE`: it is compared with all, or not in.
     level: u32,
-    /// Its place in the list of its level, or among those compared with all.
+    /// Its index in the list of its level, or among those compared with all.
     place: u32,
     /// The first of its links.
     link: u32,
@@ -70,7 +71,7 @@ const NOWHERE: Stand = Stand {
 /// Bodies of one size of cells.
 #[derive(Clone, Debug)]
 struct Level {
-    /// Power of two of the cell's side; 0 where there is one size for all.
+    /// Power of two of the cell's side; 0 when all cells have one size.
     power: i32,
     lattice: Lattice,
     bodies: Vec<BodySlot>,
@@ -86,17 +87,17 @@ pub(super) struct Grid {
     stands: Vec<Stand>,
     /// Bodies compared with all.
     endless: Vec<BodySlot>,
-    /// Largest side that the one size of cells was laid out for, metres.
+    /// Largest box side that the single cell size was laid out for, metres.
     largest_m: f64,
-    /// Boxes placed since then, and those of them beyond the edge.
+    /// Boxes placed since then, and how many of them beyond the edge.
     placed: usize,
     strayed: usize,
-    /// Bodies that the cells were laid out for.
+    /// Number of bodies that the cells were laid out for.
     laid: usize,
 }
 
 impl Grid {
-    /// Which of the three it is.
+    /// Which of the three grids this is.
     pub(super) fn kind(&self) -> Kind {
         self.kind
     }
@@ -123,9 +124,9 @@ impl Grid {
         }
     }
 
-    /// Links what came and what moved, and suggests the pairs of both and of those that are asked again.
+    /// Links bodies that came or moved, and suggests their pairs and those of bodies that are queried again.
     ///
-    /// Cost: the cells that changed, and the bodies in the cells of who moved.
+    /// Cost: the cells that changed, and the bodies in the cells of moved bodies.
     pub(super) fn update(&mut self, members: &Members, began: &mut Vec<PairKey>, work: &mut Work) {
         let changed = |slot: &&BodySlot| {
             members.is_bounded(**slot) && members.has(**slot, MOVED | ASKED | CAME)
@@ -142,7 +143,7 @@ impl Grid {
         }
     }
 
-    /// Whether the cells do not fit the boxes any more.
+    /// Returns whether the cells no longer fit the boxes.
     fn is_to_be_laid_out(&mut self, members: &Members) -> bool {
         let bodies = members.bounded();
         let moved = || {
@@ -159,7 +160,7 @@ impl Grid {
         if self.strayed * STRAYED > bodies.len() {
             return true;
         }
-        // Before they stray: as many in the cells at the rim are all compared with one another.
+        // Before bodies stray: those in the cells at the rim are all compared with one another.
         if self.kind == Kind::Uniform && bodies.len() > GROWN * self.laid {
             return true;
         }
@@ -170,7 +171,7 @@ impl Grid {
         largest_m(&mut bodies.iter().copied()) * SHRINK < self.largest_m
     }
 
-    /// One size of cells for all, from the largest box; every body is linked anew.
+    /// Lays out one cell size for all, from the largest box, and links every body again.
     fn lay_out(&mut self, members: &Members, work: &mut Work) {
         work.rebuilds += 1;
         let bodies = members.bounded();
@@ -202,7 +203,7 @@ impl Grid {
         (self.placed, self.strayed, self.laid) = (0, 0, bodies.len());
     }
 
-    /// Where a box stands: its level and its cells there; `None` for one that is compared with all.
+    /// Level and cells of a box; `None` for one that is compared with all.
     fn stand_of(&mut self, slot: BodySlot, members: &Members) -> Option<(u32, Range)> {
         let bounds = members.bounds(slot);
         let side = bounds.side();
@@ -228,7 +229,7 @@ impl Grid {
         (range.len() <= COVERED_MAX).then_some((small(level), range))
     }
 
-    /// In an array, what lies beyond stands in the cells at its edge.
+    /// In an array, cells beyond the edge are moved to the edge.
     fn clamped(&self, range: Range, lattice: &Lattice) -> Range {
         if self.kind == Kind::Uniform {
             range.clamped(lattice.shape())
@@ -305,7 +306,7 @@ impl Grid {
         }
     }
 
-    /// Suggests the pairs of a body; of two that are asked in one tick the lower tells.
+    /// Suggests the pairs of a body; if both bodies of a pair are queried in one tick, the lower slot reports it.
     fn ask(&self, slot: BodySlot, members: &Members, began: &mut Vec<PairKey>, work: &mut Work) {
         let bounds = members.bounds(slot);
         let mut test = |other: BodySlot| {
@@ -338,7 +339,7 @@ impl Grid {
             }
             for cell in range.cells() {
                 for other in self.cells.bodies(level.power, cell) {
-                    // Two boxes share cells; the pair is told in one of them.
+                    // Two boxes may share several cells; the pair is reported in one of them.
                     let shared = range.lower_shared(&self.stands[other.index()].range);
                     if shared == cell {
                         test(other);

@@ -5,7 +5,7 @@ use super::{Grid, Kind};
 use crate::broad::members::Members;
 
 impl Grid {
-    /// Every body with a box stands in exactly the cells of its box, or is compared with all.
+    /// Checks that every body with a box is linked to exactly the cells of its box, or is compared with all.
     pub(in crate::broad) fn validate(&self, members: &Members) -> Result<(), String> {
         let mut wanted = 0;
         for slot in members.bounded() {

@@ -1,18 +1,18 @@
-//! Without candidates: for motion that no fat box holds, and for crowds of pairs.
+//! Without candidates: for motion that no fat box can follow, and for very many pairs.
 //!
 //! In: every box. Out: pairs that began and pairs that parted.
 //!
-//! Bodies keep their lanes and nothing else. In each tick every box is written to its lane, and each block asks the
-//! tree for those behind it that it meets (`met`): what overlaps is a matrix of bits for each two such blocks. As long
-//! as the lanes stay, what began and what parted are differences of these bits, so no list of pairs is sorted or kept.
-//! It costs the same whatever the bodies do: dearer than candidates that last, and cheaper than candidates that never
-//! do. Which of the two a tick takes is chosen by counted work (`gear`, `probe`). Where bodies go on as they came, one
-//! search serves several ticks (`verlet`).
+//! Bodies keep their lanes and nothing else. In each tick every box is written to its lane, and each block queries the
+//! tree for later blocks that it meets (`met`): the overlaps are a bit matrix per such block pair. As long as the lanes
+//! stay, begins and ends are differences of these bits, so no list of pairs is sorted or kept. The cost is the same
+//! whatever the bodies do: more than candidates that last, less than candidates that never do. Counted work decides
+//! which of the two a tick uses (`gear`, `probe`). Where bodies keep their course, one search serves several ticks
+//! (`verlet`).
 //!
-//! Bodies are laid anew when the blocks have grown so much that what is asked too much has cost as much as that. They
-//! are sorted for it over the ticks before (`presort`), or at once where the order is spoilt at once.
+//! Bodies are laid out again once the blocks have grown so much that the extra comparisons have cost as much as that.
+//! The sort for it is spread over the ticks before (`presort`), or done at once where the order degrades at once.
 //!
-//! Exact as the rest: boxes are rounded outward, and where rounding could tell otherwise the f64 boxes are asked.
+//! Exact like the rest: boxes are rounded outward, and where rounding could change the answer the f64 boxes are tested.
 
 use super::cost::{list_cost, list_worth, search_cost};
 use super::gear::Gear;
@@ -30,68 +30,67 @@ use crate::ids::PairKey;
 use crate::simd::boxes::prefetch;
 use crate::wire::BroadMode;
 
-/// Ticks between two looks at where the bodies are and how large, for the frame of the curve: a frame that is out of
-/// date costs time, nothing else.
+/// Ticks between updates of the curve's frame to the places and sizes of the bodies; an outdated frame only costs time.
 pub(super) const FRAME_TICKS: u32 = 256;
-/// Where what was laid is spoilt in a tick, it is not even looked at in so many ticks.
+/// When a layout is spoilt within one tick, no layout is tried for this many ticks.
 const SPOILT_TICKS: u32 = 64;
 
-/// An order that is not ready when the blocks have grown so much more than they may is not waited for.
+/// A presorted order is not waited for when the blocks have grown by this factor more than allowed.
 const OVERDUE: f64 = 2.0;
 
-/// How many pairs ahead ranks are asked for.
+/// How many pairs ahead ranks are prefetched.
 const AHEAD: usize = 16;
 
-/// What becomes of the lanes in a tick.
+/// What happens to the lanes in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Lay {
-    /// Bodies stay where they are.
+    /// Bodies keep their lanes.
     Stays,
-    /// They are laid in the order that was sorted over the last ticks.
+    /// Bodies are laid out in the order that was sorted over the last ticks.
     Presorted,
-    /// They are sorted and laid at once.
+    /// Bodies are sorted and laid out at once.
     Anew,
 }
 
-/// What lasts from tick to tick, and memory kept over calls.
+/// State kept from tick to tick, and memory kept across calls.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Afresh {
-    /// In use: the order keeps no candidates then.
+    /// In use: the order has no candidates then.
     pub(super) on: bool,
     pub(super) gear: Gear,
     pub(super) probe: Probe,
-    /// Ticks since the frame of the curve was laid, and since the bodies were.
+    /// Ticks since the frame of the curve was computed, and since the bodies were laid out.
     pub(super) framed: u32,
     pub(super) laid: u32,
-    /// The order that the bodies are to be laid in next.
+    /// The order of the next layout.
     pub(super) presort: Presort,
-    /// While they are laid: lanes of the last block that have been passed.
+    /// During a layout: lanes of the last block that have been passed.
     pub(super) dealt: usize,
-    /// Ticks left in which bodies are laid without a look.
+    /// Remaining ticks in which bodies are laid out without trying to keep lanes.
     pub(super) spoilt: u32,
     /// Overlaps of the last tick, and what was found in this one.
     pub(super) held: Met,
     pub(super) verlet: Verlet,
     pub(super) finds: Finds,
-    /// Threads that search beside this one.
+    /// Other threads that search in parallel with this one.
     pub(super) team: Team,
     /// By block: lanes whose body has left since the last tick, and lanes whose body has jumped away.
     pub(super) gone: Vec<u16>,
     pub(super) jumped: Vec<u16>,
     /// Bodies that jumped in the last tick.
     pub(super) jumps: usize,
-    /// By block: the space from which it is met, when it was laid; and the mean side of a block then.
+    /// By block: the volume from which it is met, as of its layout; and the mean side of a block then.
     pub(super) reach: Vec<f32>,
     pub(super) side: f32,
-    /// Boxes compared with a block in the tick that they were laid in; and those beyond since.
+    /// Boxes compared with a block in the tick of the layout; and the excess over that since.
     pub(super) usual: u64,
     pub(super) excess: f64,
-    /// Boxes beyond `usual` that the last tick compared, reckoned by how the blocks have grown.
+    /// Excess over `usual` of the last tick, estimated from how the blocks have grown.
     pub(super) last: f64,
 }
 
 impl Order {
-    /// Lets go of candidates; their overlaps stay.
+    /// Drops the candidates; their overlaps stay.
     fn begin_afresh(&mut self) {
         self.carry_all();
         self.give_back_candidates();
@@ -99,7 +98,7 @@ impl Order {
         self.entries.clear();
         self.listed = false;
         self.worklist.clear();
-        // Lanes change without them: what was learned would be another body's.
+        // Lanes change without them: a record would belong to another body.
         self.gaits.clear();
         self.lags = false;
         self.held.clear();
@@ -109,7 +108,7 @@ impl Order {
         self.afresh.framed = FRAME_TICKS;
     }
 
-    /// Goes back to candidates: the overlaps wait for a sort of all, which must follow.
+    /// Returns to candidates: the overlaps wait for a sort of all, which must follow.
     pub(super) fn end_afresh(&mut self) {
         if self.afresh.verlet.on {
             self.end_list();
@@ -132,7 +131,7 @@ impl Order {
         } = &mut self.afresh;
         let bodies = tick.members.bounded().len();
         if !verlet.on {
-            // Where bodies were laid anew the boxes may have been searched twice.
+            // After a new layout the boxes may have been searched twice.
             gear.note_scratch(bodies, search_cost(bodies, finds.tests));
         } else if let Some(mean) = verlet.pace.mean() {
             gear.note_scratch(bodies, list_cost(bodies, mean));
@@ -166,7 +165,8 @@ impl Order {
             Lay::Anew
         };
         let (stays, presorted) = (lanes == Lay::Stays, lanes == Lay::Presorted);
-        // Overlaps that are carried to other lanes take as long as another search, each as a box compared with a block.
+        // Carrying overlaps to other lanes costs as much as another search: each as much as a box compared with a
+        // block.
         let crowded = presorted && self.hits as u64 > self.afresh.finds.tests;
         if !(stays || crowded) {
             if was {
@@ -202,8 +202,7 @@ impl Order {
         }
     }
 
-    /// Gives the bodies lanes in another order: in the one that was sorted ahead, if there is one and it has a lane for
-    /// each.
+    /// Gives the bodies new lanes: from the presorted order, if there is one with a lane for each, else by a sort now.
     fn lay<P: Proxies>(&mut self, presorted: bool, tick: &Tick<'_, P>) {
         if !(presorted && self.lay_presorted(tick)) {
             self.lay_anew(tick);
@@ -229,8 +228,8 @@ impl Order {
         tests
     }
 
-    /// Gives who came a lane, takes every box, sorts some more where a sort is under way or due, and tells what becomes
-    /// of the lanes.
+    /// Gives bodies that came a lane, takes every box, continues a sort that is under way or due, and returns what
+    /// happens to the lanes.
     fn keep_lanes<P: Proxies>(&mut self, tick: &Tick<'_, P>) -> Lay {
         if self.afresh.spoilt > 0 {
             self.afresh.spoilt -= 1;
@@ -242,7 +241,7 @@ impl Order {
             self.afresh.usual as f64,
             self.len as f64 * f64::from(LAY_TESTS),
         );
-        // Blocks do not shrink: what the last tick asked too much this one will at least, and need not be tried.
+        // Blocks do not shrink: this tick has at least the excess of the last one, so no trial is needed.
         let worn = self.afresh.excess + self.afresh.last > most;
         let changed = came + self.afresh.jumps;
         let steady = changed * MANY_CAME * (SPLIT_TICKS_MAX + 1) <= bodies;
@@ -287,7 +286,7 @@ impl Order {
         Lay::Stays
     }
 
-    /// Asks the f64 boxes of what rounding leaves open.
+    /// Tests the f64 boxes where rounding leaves the answer open.
     fn ask_open<P: Proxies>(&mut self, proxies: &P) {
         let Finds { open, met, .. } = &mut self.afresh.finds;
         for ranks in open.drain(..) {
@@ -297,13 +296,13 @@ impl Order {
         }
     }
 
-    /// Remembers every overlap of the last tick, but for those of bodies that left since.
+    /// Saves every overlap of the last tick, except those of bodies that left since.
     fn carry_held(&mut self) {
         let Afresh { held, gone, .. } = &mut self.afresh;
         held.carry(None, (gone, &self.slot_of), self.level, &mut self.carried);
     }
 
-    /// After the bodies were laid anew: of the overlaps found those that are new, of those remembered the others.
+    /// After a new layout: reports overlaps that are new, and saved overlaps that are gone.
     fn tell_carried<P>(&mut self, tick: &mut Tick<'_, P>) {
         let Afresh { held, finds, .. } = &mut self.afresh;
         held.clone_from(&finds.met);
@@ -323,7 +322,7 @@ impl Order {
         tell_all(held, &self.slot_of, tick.began);
     }
 
-    /// Reports every overlap of bodies whose pairs must be looked for, whatever moved.
+    /// Reports every overlap of bodies whose pairs must be searched, even if nothing moved.
     fn tell_asked_afresh(&mut self, members: &Members, began: &mut Vec<PairKey>) {
         let mut any = false;
         for slot in members.touched() {
@@ -346,8 +345,8 @@ impl Order {
         }
     }
 
-    /// The lists name who is in, and the overlaps held are those of the boxes; few bodies only, for that looks at every
-    /// pair.
+    /// Checks that the lists name the bodies that are in and that the stored overlaps match the boxes; for few bodies
+    /// only, since it tests every pair.
     pub(super) fn check_afresh<P: Proxies>(
         &self,
         members: &Members,

@@ -1,9 +1,10 @@
-//! Lanes as bits: one by one, and bits of matrices as pairs of what stands at their ranks.
+//! Lanes as bits: iteration over single bits, and over bits of matrices as pairs of table entries at their ranks.
 //!
 //! In: matrices of bits by two blocks. Out: a pair for each bit, in a list.
 //!
-//! How many bits a matrix has is a guess that fails, and most have one or two: what is not empty is gathered, and then
-//! gone through bit by bit as if it were one matrix, with no branch that depends on where one ends and the next begins.
+//! The number of bits in a matrix is unpredictable, and most have one or two. So words that are not empty are gathered
+//! first and then scanned bit by bit as if they were one matrix, with no branch that depends on where one ends and the
+//! next begins.
 
 use super::links::Matrix;
 use crate::ids::small;
@@ -15,7 +16,7 @@ pub(super) fn parts(rank: u32) -> (usize, usize) {
     (rank as usize / WIDTH, rank as usize % WIDTH)
 }
 
-/// The places of the ones, lowest first.
+/// The positions of the one bits, lowest first.
 #[inline(always)]
 pub(super) fn ones(bits: u16) -> Ones {
     Ones(bits)
@@ -39,9 +40,9 @@ impl Iterator for Ones {
     }
 }
 
-/// Goes through the bits of some words as if they were one: each word with the place of each of its bits.
+/// Iterates over the bits of some words as if they were one: each word with the position of each of its bits.
 ///
-/// * `words` - with one more behind the last that has a bit: it is read, and nothing is made of it.
+/// * `words` - with one extra word after the last that has a bit: it is read, and its value is not used.
 /// * `ones` - how many bits they have.
 #[inline(always)]
 pub(super) fn each_bit<W: Copy>(
@@ -65,7 +66,7 @@ pub(super) fn each_bit<W: Copy>(
     })
 }
 
-/// Rows of a matrix that make a word.
+/// Rows of a matrix in one word.
 const ROWS: usize = u64::BITS as usize / WIDTH;
 /// Words of a matrix.
 const WORDS: usize = WIDTH / ROWS;
@@ -80,10 +81,10 @@ pub(super) fn words(matrix: &Matrix) -> [u64; WORDS] {
     })
 }
 
-/// Words that are gathered before they are gone through: they stay in the first cache.
+/// Words that are gathered before they are scanned: they stay in the first-level cache.
 const TOGETHER: usize = 256;
 
-/// Some rows of a matrix, and the ranks of the first of them and of its first lane.
+/// Some rows of a matrix, with the ranks of its first row and of its first lane.
 #[derive(Clone, Copy, Debug, Default)]
 struct Word {
     bits: u64,
@@ -91,19 +92,20 @@ struct Word {
     lane: u32,
 }
 
-/// Words of matrices that hold any bit, told together: a pair for each bit, of what a table says of its two ranks.
+/// Words of matrices that have any bit, reported together: one pair per bit, made from the table entries of its two
+/// ranks.
 pub(super) struct Gathered<'a, T, F> {
     table: &'a [u32],
     pair: F,
     list: &'a mut Vec<T>,
-    /// The last is read when all are told, and never written.
+    /// The last word is read after all are reported, and never written.
     words: [Word; TOGETHER + WORDS + 1],
     len: usize,
     bits: usize,
 }
 
 impl<'a, T, F: Fn(u32, u32) -> T> Gathered<'a, T, F> {
-    /// Without any.
+    /// Empty.
     ///
     /// * `table` - by rank.
     /// * `list` - pairs are appended to it.
@@ -120,7 +122,7 @@ impl<'a, T, F: Fn(u32, u32) -> T> Gathered<'a, T, F> {
 
     /// Gathers the bits of a matrix.
     ///
-    /// * `blocks` - of its rows, and of its lanes.
+    /// * `blocks` - that of the rows, and that of the lanes.
     #[inline(always)]
     pub(super) fn put(&mut self, matrix: &Matrix, blocks: [usize; 2]) {
         self.put_words(words(matrix), blocks);
@@ -140,13 +142,13 @@ impl<'a, T, F: Fn(u32, u32) -> T> Gathered<'a, T, F> {
         }
     }
 
-    /// Tells what is left.
+    /// Reports what is left.
     #[inline(always)]
     pub(super) fn finish(mut self) {
         self.tell();
     }
 
-    /// Tells what is gathered, and forgets it.
+    /// Reports what is gathered, and clears it.
     #[inline(always)]
     fn tell(&mut self) {
         let (table, pair) = (self.table, &self.pair);
@@ -167,14 +169,14 @@ mod tests {
     #[test]
     fn every_bit_is_told_once_however_many_are_gathered() {
         let mut random = Random::new(1);
-        // Ranks stand for themselves.
+        // Each table entry is its own rank.
         let table: Vec<u32> = (0..64 * LANES).collect();
         for matrices in [0, 1, 2, 63, 500] {
             let (mut told, mut wanted) = (Vec::new(), Vec::new());
             let mut gathered = Gathered::new(&table, &mut told, |one, other| (one, other));
             for _ in 0..matrices {
                 let blocks = [(); 2].map(|()| usize::try_from(random.bits() % 64).unwrap());
-                // Empty ones, full ones, and some of all shares of bits between.
+                // Empty matrices, full ones, and some of all densities between.
                 let share = random.bits() % 5;
                 let matrix = Matrix::map([0; WIDTH], |_: u16| {
                     (0..LANES).fold(0, |bits, _| {

@@ -1,55 +1,55 @@
-//! Whether bodies go on as they came, or wander: what their boxes are swept by for some ticks follows from it.
+//! Whether bodies keep their course or wander; decides how their boxes are swept for the next ticks.
 //!
-//! In: steps of some bodies in two ticks, before the first list and as each next one is begun. Out: how a step of the
-//! last tick tells of those to come.
+//! In: steps of some bodies in two ticks, before the first list and when each next one is begun. Out: how the step of
+//! the last tick predicts those to come.
 //!
-//! Where steps are alike a box is swept along the last one. Where each goes elsewhere, as what is pushed about does,
-//! the last one says how far bodies go and not where to: the box is padded on every side, by as much as steps without a
-//! direction come to, which grows with the root of their number.
+//! Where successive steps are alike a box is swept along the last one. Where directions vary, as for bodies that are
+//! pushed about, the last step gives only the distance: the box is padded on every side by the expected distance of a
+//! random walk, which grows with the square root of the number of steps.
 //!
-//! Along an axis that scarcely parts neighbours, as height in a layer, boxes are swept both ways: who bounces there
-//! stays in, and nobody else is met for it.
+//! Along an axis that hardly separates neighbours, such as height in a layer, boxes are swept both ways: a body that
+//! bounces there stays inside, and no further boxes are met because of it.
 
 use super::idle::shed;
 use super::links::room;
 use super::ones;
 use crate::simd::boxes::{Down, WIDTH};
 
-/// What a swept box is padded by, in mean sides: what stands still but for its sender's rounding stays in.
+/// Padding of a swept box, in mean sides: a body that moves only by its sender's rounding stays inside.
 const PAD: f32 = 0.01;
-/// Ticks that a body that goes on as it came is swept for beyond those asked for: with less, who swerves leaves his box
-/// sooner; with more, more is near.
+/// Extra ticks that a body on its course is swept for. With less, a body that swerves leaves its box sooner; with more,
+/// more boxes are near.
 const SWERVE: f32 = 0.25;
 /// Most that a face is swept, in mean sides.
 const SWEEP_MAX: f32 = 2.0;
-/// A body that wanders is padded by so many steps for one tick, half of them its own and half those of all, for one
-/// step says little of the others; but by no more than so many times its own for those. Measured where velocities are
-/// drawn anew: with 1.2 most lists fail, with 2.5 a third more is near.
+/// Padding of a wandering body for one tick, in steps: half its own step and half the mean of all, since one step is a
+/// poor estimate; the mean counts as at most `OTHERS_MAX` times its own. Measured with velocities drawn at random again
+/// and again: with 1.2 most lists fail, with 2.5 a third more boxes are near.
 const WANDER: f32 = 1.8;
 const OTHERS_MAX: f32 = 4.0;
-/// Below such a mean likeness of one step and the next bodies wander, and above it they go on.
+/// Mean likeness of successive steps: below `ASTRAY` bodies wander, above `ALONG` they keep their course.
 const ASTRAY: f32 = 0.25;
 const ALONG: f32 = 0.5;
-/// Fewer bodies tell nothing.
+/// Fewer bodies are not a sample.
 const FEW: u32 = 8;
-/// An axis parts neighbours where fewer than such a share of them, some blocks from each other, overlap along it.
+/// An axis separates neighbours if fewer than this share of them, taken some blocks apart, overlap along it.
 const LAYERED: f32 = 0.9;
-/// Of so many blocks the bodies of one are watched.
+/// The bodies of one in `SAMPLE` blocks are watched.
 pub(super) const SAMPLE: usize = 8;
 
 /// How far boxes are swept.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reach {
-    /// In steps of each face outward, and in longest steps of any face; and the mean of those, in mean sides.
+    /// In steps of each face outward; in longest steps of any face; and the mean of the latter, in mean sides.
     along: f32,
     about: f32,
     step: f32,
-    /// By face: how far it is swept against a step, in parts of what it is along one.
+    /// By face: how far it is swept against a step, as a fraction of the sweep along one.
     back: [f32; 8],
 }
 
 impl Reach {
-    /// Of a body that nothing is known of.
+    /// For a body without history.
     pub(super) const NEW: Self = Self {
         along: 0.0,
         about: 0.0,
@@ -57,14 +57,14 @@ impl Reach {
         back: [0.0; 8],
     };
 
-    /// The box of a body from its last place and this one.
+    /// The swept box of a body from its last box and this one.
     #[inline(always)]
     pub(super) fn sweep(&self, before: &Down, now: &Down) -> Down {
         let side = now.mean_side();
         let side = if side.is_finite() { side } else { 0.0 };
         let mut pad = side * PAD;
         if self.about > 0.0 {
-            // Who rests is not padded for the others.
+            // A body at rest is not padded because of the others.
             let own = longest(before, now);
             let (mean, most) = (side * self.step, own * OTHERS_MAX);
             pad += (own + if mean < most { mean } else { most }) * self.about;
@@ -83,17 +83,18 @@ impl Reach {
     }
 }
 
-/// What is known of the steps.
+/// What is known about the steps.
 #[derive(Clone, Debug)]
 pub(super) struct Course {
-    /// The first boxes of those who are watched, by watched block.
+    /// The first boxes of the watched bodies, by watched block.
     watched: Vec<[Down; WIDTH]>,
-    /// Sums over them: how alike two steps are, 1 for the same and 0 for those across or of other lengths; longest
+    /// Sums over them: likeness of two steps, 1 for equal ones and 0 for those across or of other lengths; and longest
     /// steps of a face in mean sides.
     alike: f32,
     steps: f32,
     count: u32,
-    /// The boxes of the block watched before; by axis, how many overlap the one in their lane there, and of how many.
+    /// The boxes of the block watched before; by axis, how many overlap the box in the same lane there, and out of how
+    /// many.
     last: [Down; WIDTH],
     level: [f32; 3],
     beside: f32,
@@ -140,7 +141,7 @@ impl Course {
         }
     }
 
-    /// Room for those of so many blocks.
+    /// Makes room for the watched bodies of `blocks` blocks.
     pub(super) fn reserve(&mut self, blocks: usize) {
         room(&mut self.watched, blocks.div_ceil(SAMPLE));
     }
@@ -150,13 +151,13 @@ impl Course {
         shed(&mut self.watched);
     }
 
-    /// Nobody is watched.
+    /// Stops watching all bodies.
     pub(super) fn clear(&mut self) {
         self.watched.clear();
     }
 
-    /// Takes the first boxes of some lanes of the next watched block. Out of line, as what follows: the loop around it
-    /// is about others.
+    /// Takes the first boxes of some lanes of the next watched block. Out of line, like the next ones: the loop around
+    /// it is about other work.
     #[inline(never)]
     pub(super) fn watch(&mut self, lanes: u16, before: &[Down; WIDTH]) {
         let mut watched = [Down::EMPTY; WIDTH];
@@ -166,7 +167,7 @@ impl Course {
         self.watched.push(watched);
     }
 
-    /// A lane has got another body.
+    /// A lane got another body.
     pub(super) fn forget(&mut self, block: usize, lane: usize) {
         if block.is_multiple_of(SAMPLE)
             && let Some(watched) = self.watched.get_mut(block / SAMPLE)
@@ -175,12 +176,12 @@ impl Course {
         }
     }
 
-    /// Whether those who are watched have yet to be asked.
+    /// Returns whether the watched bodies are still to be measured.
     pub(super) fn asks(&self) -> bool {
         !self.watched.is_empty()
     }
 
-    /// Takes the boxes of some lanes of a watched block one tick later and two.
+    /// Takes the boxes of some lanes of a watched block, one and two ticks later.
     #[inline(never)]
     pub(super) fn note(
         &mut self,
@@ -199,11 +200,11 @@ impl Course {
         }
     }
 
-    /// Takes the boxes of two bodies that are some blocks from each other.
+    /// Takes the boxes of two bodies that are some blocks apart.
     fn note_beside(&mut self, one: &Down, other: &Down) {
         let (mut apart, mut known) = ([false; 3], true);
         for k in 0..one.faces.len() {
-            // Lower face of the one minus upper face of the other: above zero where they are apart.
+            // Lower face of one minus upper face of the other: above zero where they are apart.
             let gap = one.faces[k] + other.faces[(k + 4) % 8];
             known &= gap.is_finite();
             if k % 4 < 3 {
@@ -232,7 +233,7 @@ impl Course {
         }
         let longer = if first > second { first } else { second };
         let (alike, step) = (dot / longer, longest(then, now) / now.mean_side());
-        // Who rests, came or has no end has none; and one who flies far is one of many.
+        // A body that rests, came or is infinite gives no number; one that flies far counts as one of many.
         if alike.is_finite() && step.is_finite() {
             self.alike += alike;
             self.steps += if step < SWEEP_MAX { step } else { SWEEP_MAX };
@@ -240,7 +241,7 @@ impl Course {
         }
     }
 
-    /// Whoever was watched has been asked.
+    /// Ends the measurement of the watched bodies.
     pub(super) fn close(&mut self) {
         #[allow(clippy::cast_precision_loss, reason = "at most the bodies, a mean")]
         let count = self.count as f32;

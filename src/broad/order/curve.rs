@@ -1,51 +1,51 @@
-//! The curve that bodies stand along: classes of size, and within a class the Morton curve through cells.
+//! The curve along which bodies are sorted: size classes, and within a class the Morton curve through cells.
 
 use crate::math::morton_bits;
 
 /// Bits of the curve on each axis. A cell is then an eighth of a block's side at a million bodies.
 const AXIS_BITS: u32 = 10;
-/// Bits of a place on the curve.
+/// Bits of a position on the curve.
 pub(super) const CURVE_BITS: u32 = 3 * AXIS_BITS;
 /// Octaves of size: the longest sides from 2^-32 to 2^31 metres, all others at the ends.
 const OCTAVES: usize = 64;
-/// Those below a metre.
+/// Octaves below one metre.
 const OCTAVES_BELOW_ONE: i32 = 32;
-/// Cells of the curve along the side of a small body, at most: finer ones put nobody in a better place.
+/// Most cells of the curve along the side of a small body: finer ones improve no body's place.
 const CELLS_A_SIDE: f64 = 8.0;
-/// Octaves that share a class. Boxes of a block then differ by a factor of 4 at most, and scenes whose sizes lie about
-/// a power of two are not torn in two.
+/// Octaves per class. Boxes of a block then differ by a factor of 4 at most, and scenes whose sizes vary around a power
+/// of two are not split in two.
 const OCTAVES_A_CLASS: usize = 2;
 /// Most classes: the bits that a sorted word has for them.
 pub(super) const CLASSES_MAX: usize = 64;
-/// Bodies that are asked, at most, how far the others lie from one another.
+/// Most bodies sampled to find how far apart they lie.
 pub(super) const SAMPLE: usize = 1023;
-/// One in so many of those may lie far from all others, on either side.
+/// One in this many of the sample may lie far from all others, on either side.
 const FAR_AWAY: usize = 32;
 
 /// Cells along the three axes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cells {
     low: [f32; 3],
-    /// Cells a metre.
+    /// Cells per metre.
     scale: [f32; 3],
 }
 
-/// The frame of the curve: where a box belongs.
+/// The frame of the curve: gives each box its key.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
     cells: Cells,
-    /// The most cells a metre that are of use.
+    /// The most cells per metre that are useful.
     finest: f64,
     /// By octave: its class.
     classes: [u8; OCTAVES],
 }
 
 impl Cells {
-    /// Those that suit bodies with these middles. A few that are far away do not make them coarse for all: they are put
-    /// at the edge.
+    /// Cells for bodies with these centres. A few bodies far away do not make the cells coarse for all: they go to the
+    /// edge.
     ///
-    /// * `middle` - of one of `count`.
-    /// * `finest` - cells a metre, at most.
+    /// * `middle` - centre of one of `count` bodies.
+    /// * `finest` - most cells per metre.
     pub(super) fn of(count: usize, middle: impl Fn(usize) -> [f32; 3], finest: f64) -> Self {
         let mut cells = Self::default();
         let mut sample = [0.0; SAMPLE];
@@ -73,7 +73,7 @@ impl Cells {
         cells
     }
 
-    /// The place of a point along the curve.
+    /// The position of a point along the curve.
     #[inline(always)]
     pub(super) fn place(&self, middle: [f32; 3]) -> u64 {
         let mut place = 0;
@@ -90,7 +90,7 @@ impl Cells {
         place
     }
 
-    /// Whether finer cells could put bodies in better places.
+    /// Returns whether finer cells could improve the order.
     #[allow(
         clippy::cast_possible_truncation,
         reason = "a place on a curve, not a bound"
@@ -111,7 +111,7 @@ impl Default for Frame {
 }
 
 impl Frame {
-    /// The one that suits these boxes.
+    /// The frame for these boxes.
     pub(super) fn of(boxes: &[[f32; 6]]) -> Self {
         let mut frame = Self::default();
         let mut seen = [0_u32; OCTAVES];
@@ -125,7 +125,7 @@ impl Frame {
         frame
     }
 
-    /// Whether the origin is so near that rounding moves no face by more than a thousandth of a cell.
+    /// Returns whether the origin is so near that rounding moves no face by more than a thousandth of a cell.
     pub(super) fn is_near_origin(&self) -> bool {
         let cells = f32::from(1_u16 << AXIS_BITS);
         let near = |(low, scale): (&f32, &f32)| low.abs() <= 2.0 * cells / scale;
@@ -149,20 +149,20 @@ impl Frame {
         }
     }
 
-    /// Where a box belongs: its class above its place on the curve.
+    /// The sort key of a box: its class above its position on the curve.
     pub(super) fn key(&self, one: &[f32; 6]) -> u64 {
         let class = self.classes[octave(one)];
         u64::from(class) << CURVE_BITS | self.cells.place(centre(one))
     }
 
-    /// The most cells a metre that are of use, where those of this frame are fewer.
+    /// The most cells per metre that are useful, if this frame has fewer.
     pub(super) fn finer(&self) -> Option<f64> {
         self.cells.are_coarse(self.finest).then_some(self.finest)
     }
 
-    /// The same frame, told by another origin.
+    /// Moves the frame to another origin.
     ///
-    /// * `by` - the new origin less the old one.
+    /// * `by` - the new origin minus the old one.
     pub(super) fn shift(&mut self, by: [f64; 3]) {
         for (low, by) in self.cells.low.iter_mut().zip(by) {
             #[allow(
@@ -175,8 +175,8 @@ impl Frame {
     }
 }
 
-/// Most cells of the curve a metre: where bodies lie in a sheet or a line, finer cells across it would part neighbours
-/// by what is less than their size.
+/// Most cells of the curve per metre: where bodies lie in a sheet or a line, finer cells across it would separate
+/// neighbours by less than their size.
 ///
 /// * `seen` - how many of `count` boxes have their longest side in each octave.
 fn cells_a_metre(seen: &[u32; OCTAVES], count: usize) -> f64 {
@@ -195,12 +195,12 @@ fn cells_a_metre(seen: &[u32; OCTAVES], count: usize) -> f64 {
 /// The octave of the longest side.
 fn octave(one: &[f32; 6]) -> usize {
     let side = (one[3] - one[0]).max(one[4] - one[1]).max(one[5] - one[2]);
-    // The exponent of an f32 is its upper bits; NaN and what is beyond the octaves go to the ends.
+    // The exponent of an f32 is in its upper bits; NaN and values beyond the octaves go to the ends.
     let exponent = (side.to_bits() >> 23) & 0xFF;
     (exponent.clamp(127 - 32, 127 + 31) - (127 - 32)) as usize
 }
 
-/// The middle of a box; of an infinite one, anything.
+/// The centre of a box; arbitrary for an infinite one.
 #[inline(always)]
 pub(super) fn centre(one: &[f32; 6]) -> [f32; 3] {
     std::array::from_fn(|k| {
@@ -209,12 +209,12 @@ pub(super) fn centre(one: &[f32; 6]) -> [f32; 3] {
     })
 }
 
-/// Some places of so many, evenly.
+/// Evenly spaced indices below `count`, at most `SAMPLE`.
 pub(super) fn sampled(count: usize) -> impl Iterator<Item = usize> {
     (0..count).step_by(count.div_ceil(SAMPLE).max(1))
 }
 
-/// Puts them at the front of a list; what has no room is left out.
+/// Copies items to the front of a list; those that do not fit are left out.
 pub(super) fn fill<T: Copy>(list: &mut [T], items: impl Iterator<Item = T>) -> &mut [T] {
     let mut len = 0;
     for (place, item) in list.iter_mut().zip(items) {

@@ -2,13 +2,13 @@
 
 use crate::limits::BODIES_MAX;
 
-/// A candidate, as one word: whether the boxes overlapped at the last look, the ranks, the lower first, and the ages of
-/// the two lanes when it was listed, one byte each: with another age it is dead. Its record is looked for where
-/// anything changes: of a long list every byte counts.
+/// A candidate in one word: whether the boxes overlapped at the last look, the two ranks, the lower first, and the ages
+/// of the two lanes when it was listed, one byte each: if an age differs the entry is dead. Its record is looked up
+/// only when something changes: in a long list every byte counts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry(u64);
 
-/// Bits of a rank: those of `limits::BODIES_MAX` bodies and of the lanes that stay free among them.
+/// Bits of a rank: enough for `limits::BODIES_MAX` bodies and the free lanes among them.
 const RANK_BITS: u32 = 23;
 const AGES_BITS: u32 = 16;
 /// The bit that says whether the boxes overlapped.
@@ -51,7 +51,7 @@ impl Entry {
     }
 }
 
-/// Ages as they stand in an [`Entry`].
+/// Two ages as stored in an [`Entry`].
 #[inline(always)]
 pub(super) fn ages(first: u8, second: u8) -> u16 {
     u16::from(first) | u16::from(second) << 8

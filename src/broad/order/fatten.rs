@@ -1,16 +1,16 @@
-//! From a box of the world to what is stored: rounded outward to f32 near the scene's origin, and widened by where the
-//! body is about to go.
+//! From a box of the world to the stored box: rounded outward to f32 near the scene's origin, and widened along the
+//! expected motion of the body.
 //!
 //! Why widened: a body inside its fat box costs one containment test and no work on the structure. The box is swept
-//! along the motion of each of its six faces (so that what turns or grows is followed too) for some ticks, and padded
-//! by a margin that the body learns from its own escapes.
+//! along the motion of each of its six faces for some ticks (so that rotation and growth are covered too), and padded
+//! by a margin that adapts to the body's own escapes.
 //!
-//! A body that trembles about its place keeps all places that it has been at, and a little more: its fat box and its
-//! core are those of its whole motion, as tight as they can be and stay.
+//! For a body that vibrates around its place the union and the intersection of all its boxes so far are kept, plus a
+//! little: its fat box and its core cover its whole motion, as tight as they can be and stay valid.
 //!
-//! The same motion inward leaves a core that the box goes on holding meanwhile. Two bodies whose cores overlap are
-//! surely a pair: as long as each keeps to its hold, nobody compares their boxes. In a pile at rest, or in a heap, that
-//! is nearly every pair.
+//! The same motion inward leaves a core that the box keeps containing meanwhile. Two bodies whose cores overlap are
+//! certainly a pair: as long as each box stays between its core and its fat box (its hold), their boxes are not
+//! compared. In a pile at rest, or in a heap, that is nearly every pair.
 
 mod rest;
 
@@ -19,62 +19,63 @@ pub(super) use rest::hold_of_seen;
 use crate::math::Aabb;
 use crate::simd::boxes::{Down, Hold, Lanes, SPARE};
 
-/// Ticks that a fat box is swept for. Few mean many renewals, many mean many candidates: in the gas of the bench 8 to
-/// 16 come out alike.
+/// Ticks that a fat box is swept for. Few ticks mean many renewals, many mean many candidates: in the bench's gas scene
+/// 8 to 16 perform alike.
 pub(super) const HORIZON: u32 = 16;
-/// Most that a face is swept, in mean sides of the box: beyond it the candidates grow by the cube.
+/// Most that a face is swept, in mean sides of the box: beyond it the number of candidates grows by the cube.
 const SWEEP_MAX: f32 = 0.75;
-/// Most that a margin is, in mean sides.
+/// Largest margin, in mean sides.
 const MARGIN_MAX: f32 = 0.2;
-/// Least margin, in shortest sides: what stands still but for its sender's rounding stays in.
+/// Least margin, in shortest sides: a body that moves only by its sender's rounding stays inside.
 const MARGIN_MIN: f32 = 1e-3;
-/// A side that is shorter counts as one of so many of the mean one: a wide floor is thin, and who stands on it is to be
-/// sure of it.
+/// A side shorter than the mean side divided by this counts as that: a wide floor is thin, and bodies on it shall be
+/// certain pairs with it.
 const THIN: f32 = 64.0;
-/// A margin that was enough for as long as was hoped shrinks by this factor, so that a body that has calmed is tight
+/// A margin that was enough for the whole horizon shrinks by this factor, so that a body that has calmed becomes tight
 /// again.
 const SHRINK: f32 = 0.9;
-/// Ticks that a fat box lasts before its body is taken to have calmed: it gets another, for it would keep the margin of
-/// its way for ever.
+/// Ticks that a fat box lasts before its body counts as calmed: it gets another box, since otherwise it would keep its
+/// old margin for ever.
 const CALMED_TICKS: u32 = 4 * HORIZON;
-/// The margin of a body that has calmed shrinks by this factor besides [`SHRINK`].
+/// The margin of a calmed body shrinks by this factor in addition to [`SHRINK`].
 const CALMED_SHRINK: f32 = 0.25;
-/// A body that goes farther than any margin within so many ticks may be wild.
+/// A body that exceeds every possible margin within this many ticks may be wild.
 const WILD_TICKS: u32 = 1;
-/// Bodies that went farther than any margin within [`WILD_TICKS`] so often in a row are wild: they get tight boxes, for
-/// no box holds them.
+/// Bodies that exceeded every possible margin within [`WILD_TICKS`] this often in a row are wild: they get tight boxes,
+/// for no fat box holds them.
 const WILD_AFTER: u8 = 2;
-/// After so many tight boxes a wild body is tried with a fat one again.
+/// After this many tight boxes a wild body gets a fat one again, as a trial.
 const WILD_RETRY: u8 = 40;
-/// Bodies that left their fat boxes so often in a row, by little and by faces that were not swept, are at rest.
+/// Bodies that left their fat boxes this often in a row, by little and by faces that were not swept, are at rest.
 const REST_AFTER: u8 = 2;
-/// Bodies at rest are so no more when they leave their holds within a tick so often in a row, or have been about by
-/// more than [`MARGIN_MAX`].
+/// A body at rest loses that status when it leaves its hold within a tick this often in a row, or its motion spans more
+/// than [`MARGIN_MAX`].
 const REST_TRIES: u8 = 12;
-/// What a body that is new among others at rest is given on every side, as a share of what those span. Measured in the
-/// pile of the bench: with less more bodies leave in the ticks after, with more fewer pairs are sure for ever.
+/// Margin on every side of a new body among others at rest, as a share of the span of their motion. Measured in the
+/// bench's pile scene: with less, more bodies leave in the ticks after; with more, fewer pairs are certain for ever.
 const GUESS_SHARE: f32 = 0.6;
 
-/// What a body has learned about its motion.
+/// What was learned about a body's motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gait {
     /// Its box when the fat one was made: the faces of a [`Down`] without the spare ones.
     anchor: [f32; 6],
-    /// The order's beat then, less the times that the body has moved between beats; see [`Gait::note_move`].
+    /// The order's beat at that time, minus the body's own moves between beats; see [`Gait::note_move`].
     born: u32,
-    /// What is added on every side, metres.
+    /// Padding on every side, metres.
     margin: f32,
     /// Times in a row that it left at once.
     wild: u8,
-    /// Times in a row that it left as a body at rest does; above `REST_AFTER` it is one.
+    /// Times in a row that it left as a body at rest does; above `REST_AFTER` it is at rest.
     rest: u8,
-    /// Times that its hold was made narrower in vain, and whether that was the last that happened to it (`rest`).
+    /// Times that its hold was narrowed without success, and whether narrowing was the last thing that happened to it
+    /// (`rest`).
     vain: u8,
     narrowed: bool,
 }
 
 impl Gait {
-    /// Of a body that nothing is known of.
+    /// For a body without history.
     pub(super) const NEW: Self = Self {
         anchor: [0.0; 6],
         born: u32::MAX,
@@ -85,7 +86,7 @@ impl Gait {
         narrowed: false,
     };
 
-    /// Of a body among others that are at rest, and span so much; metres.
+    /// For a body among others at rest.
     pub(super) fn at_rest(span: f32) -> Self {
         Self {
             margin: span * GUESS_SHARE,
@@ -99,7 +100,7 @@ impl Gait {
         Down::of_six(self.anchor)
     }
 
-    /// What a body at rest spans, in its mean sides; `None`: it is not at rest, or has no hold that tells.
+    /// Span of the motion of a body at rest, in its mean sides; `None`: not at rest, or its hold does not show it.
     pub(super) fn span(&self, held: &Hold) -> Option<f32> {
         let side = self.anchor().mean_side();
         let widest = (0..3).fold(0.0, |widest: f32, k| {
@@ -138,7 +139,7 @@ impl Gait {
                 core,
             };
         }
-        // Of a body that is new and was not seen it is not known where it has been: its margin is a guess at it.
+        // Where a new, unobserved body has been is unknown: its margin is a guess.
         if self.rest >= REST_AFTER && !(is_new && held.is_lost()) {
             let narrow = self.narrow(held, age);
             if let Some(hold) = self.stay(&before, &narrow, side) {
@@ -157,7 +158,7 @@ impl Gait {
         };
         let most = side * SWEEP_MAX;
         for (k, before) in before.faces.into_iter().enumerate() {
-            // Outward is down on every lane.
+            // Outward is down on every lane (upper faces are stored negated).
             let out = (before - now.faces[k]) * ahead;
             let clamped = |far: f32| {
                 let far = if far > 0.0 { far } else { 0.0 };
@@ -174,21 +175,21 @@ impl Gait {
         }
     }
 
-    /// It moves between two beats: it alone grows older. So a body that moves now and then is swept by its moves, which
-    /// say how far it goes, and not by the time that it stood still.
+    /// The body moves between two beats: only its own age grows. So a body that moves now and then is swept by its
+    /// moves, which show how far it goes, and not by the time that it stood still.
     #[inline(always)]
     pub(super) fn note_move(&mut self) {
         self.born = self.born.wrapping_sub(1);
     }
 
-    /// Whether it trembles about its place.
+    /// Returns whether it vibrates around its place.
     #[inline(always)]
     pub(super) fn is_at_rest(&self) -> bool {
         self.rest > REST_AFTER
     }
 
-    /// Whether the body has calmed, and its margin is wider than it need be; or it has been at rest for so long that it
-    /// may be about less than it was.
+    /// Returns whether the body has calmed and its margin is wider than needed; or has been at rest for so long that
+    /// its motion may have become smaller.
     #[inline(always)]
     pub(super) fn has_calmed(&self, now: &Down, beat: u32) -> bool {
         if self.is_at_rest() {
@@ -199,7 +200,7 @@ impl Gait {
         loose && side.is_finite() && self.age(beat) >= CALMED_TICKS
     }
 
-    /// Times that it may have moved since its fat box was made; 0 without one.
+    /// Number of times that it may have moved since its fat box was made; 0 without one.
     #[inline(always)]
     pub(super) fn age(&self, beat: u32) -> u32 {
         match self.born {
@@ -208,8 +209,8 @@ impl Gait {
         }
     }
 
-    /// Whether a body that goes on as it came will have left its fat box some ticks from now. One that trembles about
-    /// its place will not.
+    /// Returns whether a body that keeps its course will have left its fat box some ticks from now. One that vibrates
+    /// around its place will not.
     #[inline(always)]
     pub(super) fn leaves<L: Lanes>(
         &self,
@@ -227,14 +228,14 @@ impl Gait {
         let mut then = *now;
         for (face, before) in then.faces.iter_mut().zip(self.anchor().faces) {
             let out = (before - *face) * share;
-            // What moves inward counts for nothing.
+            // Inward motion is ignored.
             *face -= if out > 0.0 { out } else { 0.0 };
         }
         !lanes.holds(&held.fat, &then)
     }
 
-    /// A body that left by a face that its box was not swept towards trembles, or turned: its margin grows. One that
-    /// went on as it came was held as long as could be hoped: its margin shrinks.
+    /// A body that left by a face that its box was not swept towards vibrates, or turned: its margin grows. One that
+    /// kept its course stayed for the whole horizon: its margin shrinks.
     #[inline(always)]
     fn learn(&mut self, now: &Down, held: &Hold, age: u32, side: f32) {
         let most = side * MARGIN_MAX;
@@ -249,7 +250,7 @@ impl Gait {
         }
         let small = self.margin * 4.0 <= most;
         if self.is_at_rest() {
-            // At once, and it may be on its way; later, it is still at rest.
+            // If it left at once it may have started moving; if later, it is still at rest.
             let tries = self.rest + 1;
             self.rest = match age {
                 1 if tries > REST_AFTER + REST_TRIES => 0,
@@ -276,7 +277,7 @@ impl Gait {
     }
 }
 
-/// The shortest side, as margins reckon.
+/// The shortest side, with the lower limit used for margins.
 #[inline(always)]
 fn thin(now: &Down, side: f32) -> f32 {
     let mut shortest = side;
@@ -288,13 +289,12 @@ fn thin(now: &Down, side: f32) -> f32 {
     if shortest > least { shortest } else { least }
 }
 
-/// No core: every box holds it, and it overlaps nothing.
+/// No core: every box contains it, and it overlaps nothing.
 const NO_CORE: Down = Down {
     faces: [f32::INFINITY; 8],
 };
 
-/// The fat box that stands in a block for one that a box keeps to as [`Lanes::keeps`] tells: wider by what rounding
-/// outward takes, twice.
+/// The fat box stored in a block when [`Lanes::keeps`] tests containment: wider by twice the outward rounding.
 #[inline(always)]
 pub(super) fn loose(fat: &Down) -> Down {
     let mut wide = *fat;
@@ -304,7 +304,7 @@ pub(super) fn loose(fat: &Down) -> Down {
     wide
 }
 
-/// A box of the world as it is stored.
+/// A box of the world in stored form.
 #[inline(always)]
 pub(super) fn outward<L: Lanes>(lanes: L, aabb: &Aabb, origin: &[f64; 3]) -> Down {
     lanes.outward(aabb.min.coords.as_ref(), aabb.max.coords.as_ref(), origin)

@@ -1,4 +1,4 @@
-//! Which way of working a tick takes: candidates that last, or none (`afresh`).
+//! Which mode a tick uses: candidates that last, or none (`afresh`).
 //!
 //! In: counted work (`cost`), never time, so that a replay chooses alike. Out: a choice, with hysteresis.
 
@@ -7,57 +7,57 @@ use super::probe::PROBE_TICKS;
 use super::{MANY_MOVED, Work};
 use crate::wire::BroadCause;
 
-/// Ticks that a mean of the work is taken over.
+/// Ticks that the mean of the work is taken over.
 const MEAN_TICKS: u64 = 16;
-/// Ticks after a sort of all that do not count in that mean: bodies have yet to learn their margins. With fewer, what
-/// they learn by speaks against candidates; with more, candidates that do not pay are given up later.
+/// Ticks after a sort of all that are left out of that mean: bodies have yet to learn their margins. With fewer, the
+/// cost of learning counts against candidates; with more, candidates that do not pay are given up later.
 const SETTLE_TICKS: u64 = 16;
-/// Ticks after a sort of all that count in no mean at all; by those after them hopeless candidates are given up without
-/// a longer look.
+/// Ticks after a sort of all that count in no mean; the ticks after them suffice to give up hopeless candidates without
+/// a longer measurement.
 const EARLY_TICKS: u64 = 8;
-/// Least ticks by the mean of which candidates are told to be hopeless: with fewer one dear tick would do, with more
+/// Least ticks in the mean by which candidates are judged hopeless: with fewer one expensive tick would do, with more
 /// they are kept for longer.
 const EARLY_MEAN: u64 = 4;
-/// Candidates are hopeless where they take more than so many times what none do.
+/// Candidates are hopeless when they cost more than this many times as much as no candidates.
 const HOPELESS: u64 = 2;
-/// Least ticks before hopeless candidates are tried again: a trial costs several times what it tries to save.
+/// Least ticks before hopeless candidates are tried again: a trial costs several times what it could save.
 const SPELL_LONG: u32 = 512;
-/// Below so many bodies either way takes next to nothing.
+/// With fewer bodies either mode takes almost no time.
 const BODIES_MIN: u64 = 64;
-/// Of more than `FAR` bodies the first ticks are worked without candidates: until their margins are learned these take
-/// several times as much, and memory that is not needed if they do not pay. A short probe tells whether they may.
+/// With more than `FAR` bodies the first ticks work without candidates: until margins are learned, candidates cost
+/// several times as much, and memory that is wasted if they do not pay. A short probe estimates whether they may.
 const FIRST_TICKS: u32 = 24;
-/// The probe of those first ticks speaks for candidates where no more of 1024 bodies than this escape from their fat
-/// boxes in a tick. With more, candidates are tried that do not pay; with fewer, those that would pay wait.
+/// That first probe favours candidates if at most this many of 1024 bodies escape from their fat boxes per tick. With a
+/// higher limit candidates are tried that do not pay; with a lower one, those that would pay wait.
 const FIRST_ESCAPES: u64 = 64;
-/// Ticks without candidates before these are tried again, if a probe promises anything; twice as many when in vain.
+/// Ticks without candidates before they are tried again, if a probe is promising; doubled after a failure.
 const SPELL_MIN: u32 = 128;
 const _: () = assert!(
     SPELL_MIN >= 2 * PROBE_TICKS,
     "one probe at its begin, one at its end"
 );
 const SPELL_MAX: u32 = 2048;
-/// So many spells end without a trial where probes promise nothing, for they do not see all that candidates cost.
+/// So many spells may end without a trial when probes are not promising; then one is made, as probes miss some costs.
 const VAIN_MAX: u32 = 64;
-/// Fat boxes that candidates renew for each one that a body escapes from, at most: some are renewed along with others.
+/// Most fat boxes renewed with candidates per escape: some are renewed along with others.
 const RENEWED_PER_ESCAPE: u64 = 3;
-/// A trial of candidates that lasted so many ticks was no failure.
+/// A trial of candidates that lasted this many ticks was no failure.
 const TRIAL_TICKS: u32 = 64;
-/// So many ticks in a row with few moved, and candidates are better without a trial.
+/// After this many ticks in a row with few moved bodies, candidates are better without a trial.
 const CALM_TICKS: u32 = 4;
 
-/// What decides whether candidates pay.
+/// The measurements that decide whether candidates pay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Footing {
-    /// Bodies that escape from their fat boxes in a tick, of 1024.
+    /// Bodies of 1024 that escape from their fat boxes in a tick.
     pub(super) escapes: u64,
-    /// How crowded it is, by the overlaps of 1024 bodies.
+    /// Density: by the overlaps of 1024 bodies.
     pub(super) crowd: u64,
 }
 
 impl Footing {
-    /// Whether candidates may pay now, which did not then: bodies keep longer to their fat boxes, or there is another
-    /// crowd of them.
+    /// Returns whether candidates may pay now although they did not then: bodies stay longer in their fat boxes, or the
+    /// density has changed.
     fn promises(&self, then: &Self) -> bool {
         let calmer = self.escapes * 4 < then.escapes * 3;
         let (few, many) = (self.crowd.min(then.crowd), self.crowd.max(then.crowd));
@@ -65,33 +65,33 @@ impl Footing {
     }
 }
 
-/// What the choice is made by.
+/// State of the choice.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gear {
-    /// The choice, where it is not left to counted work.
+    /// The choice, if it is forced.
     pub(super) forced: Option<bool>,
-    /// Why the last tick was worked without candidates, or the first one with them again.
+    /// Why the last tick had no candidates, or the first one had them again.
     pub(super) cause: BroadCause,
-    /// Mean work of a tick with candidates, and how many ticks it is a mean of.
+    /// Mean work of a tick with candidates, and the number of ticks in it.
     mean: u64,
     ticks: u64,
-    /// Ticks left without candidates, and how many there will be the next time.
+    /// Remaining ticks without candidates, and the length of the next such spell.
     left: u32,
     spell: u32,
     /// Ticks since the last spell began or ended.
     since: u32,
     calm: u32,
-    /// What a tick without candidates costs, for 1024 bodies, by the last one; 0 before the first.
+    /// Cost of a tick without candidates per 1024 bodies, from the last one; 0 before the first.
     scratch: u64,
-    /// Fat boxes renewed in a tick with candidates, of 1024 bodies, in the mean; of the last such ticks while there are
-    /// none.
+    /// Fat boxes renewed per tick with candidates, per 1024 bodies, on average; while there are no candidates, of the
+    /// last such ticks.
     renewed: u64,
-    /// The footing right after candidates were given up, and the last one since.
+    /// The measurement right after candidates were given up, and the last one since.
     first: Option<Footing>,
     last: Option<Footing>,
-    /// Spells since without a trial.
+    /// Spells since then without a trial.
     vain: u32,
-    /// Candidates have not lasted long enough yet to be told by.
+    /// Candidates have not lasted long enough yet to be judged.
     untried: bool,
 }
 
@@ -117,10 +117,10 @@ impl Default for Gear {
 }
 
 impl Gear {
-    /// Whether this tick is to be worked without candidates.
+    /// Returns whether this tick works without candidates.
     ///
-    /// * `on` - whether the last one was.
-    /// * `usual`, `hits` - blocks that a block's query meets, in sixteenths; and overlaps.
+    /// * `on` - whether the last one did.
+    /// * `usual`, `hits` - blocks met by a block's query, in sixteenths; and overlaps.
     pub(super) fn choose(
         &mut self,
         on: bool,
@@ -159,7 +159,7 @@ impl Gear {
             };
             self.cause == BroadCause::Spell
         } else if self.untried && bodies > FAR {
-            // Who came is not told as moved.
+            // Bodies that came are not listed as moved.
             self.calm = 0;
             self.cause = BroadCause::Spell;
             true
@@ -171,7 +171,7 @@ impl Gear {
             };
             let seen = self.ticks.saturating_sub(self.counted_from());
             hopeless = seen >= EARLY_MEAN && self.mean > scratch * HOPELESS;
-            // A fifth more: a change costs as much as some ticks.
+            // A margin of one fifth: a change costs as much as some ticks.
             let settled = self.ticks >= SETTLE_TICKS + MEAN_TICKS;
             self.cause = BroadCause::Cost;
             bodies as u64 >= BODIES_MIN && (hopeless || (settled && self.mean * 5 > scratch * 6))
@@ -199,9 +199,9 @@ impl Gear {
         chosen
     }
 
-    /// Whether candidates would fare as they did when they were given up, as far as probes tell. The first came a
-    /// little later: what had calmed by then is seen by what candidates themselves had to renew. Before any trial:
-    /// whether more bodies would escape than candidates are worth.
+    /// Returns whether, according to probes, candidates would do as badly as when they were given up. The first probe
+    /// came a little later: what had calmed by then is judged by the renewals that candidates really had. Before any
+    /// trial: whether more bodies would escape than candidates are worth.
     fn is_as_it_was(&self) -> bool {
         match (self.first, self.last) {
             (Some(now), _) if self.untried => now.escapes > FIRST_ESCAPES,
@@ -212,8 +212,8 @@ impl Gear {
         }
     }
 
-    /// Whether a tick without candidates is one of a probe, and the first: there is one after candidates were given up,
-    /// and one before they may be tried again.
+    /// Returns `Some` if a tick without candidates belongs to a probe, with whether it is the first of it. There is a
+    /// probe after candidates were given up, and one before they may be tried again.
     pub(super) fn probes(&self) -> Option<bool> {
         let first = self.since < PROBE_TICKS;
         if self.forced.is_some() || !(first || self.left <= PROBE_TICKS) {
@@ -226,12 +226,12 @@ impl Gear {
         })
     }
 
-    /// Whether a probe of so many ticks is told what it has come to.
+    /// Returns whether a probe of this many ticks is to be evaluated.
     pub(super) fn asks_probe(&self, ticks: u32) -> bool {
         ticks == PROBE_TICKS || (self.untried && ticks == FIRST_TICKS)
     }
 
-    /// Takes what a probe has come to.
+    /// Takes the result of a probe.
     pub(super) fn note_probe(&mut self, footing: Footing) {
         if self.since < PROBE_TICKS {
             self.first = Some(footing);
@@ -240,7 +240,7 @@ impl Gear {
         }
     }
 
-    /// The tick after which the mean begins: early ones count until bodies have settled.
+    /// The tick after which the mean begins: early ticks count until bodies have settled.
     fn counted_from(&self) -> u64 {
         if self.ticks > SETTLE_TICKS {
             SETTLE_TICKS
@@ -249,8 +249,7 @@ impl Gear {
         }
     }
 
-    /// Takes what a tick without candidates costs; of a world that was left by nearly all it says nothing of the next
-    /// bodies.
+    /// Takes the cost of a tick without candidates; if nearly all bodies left, it does not predict the next ones.
     pub(super) fn note_scratch(&mut self, bodies: usize, cost: u64) {
         let bodies = bodies as u64;
         self.scratch = if bodies < BODIES_MIN {
@@ -262,10 +261,10 @@ impl Gear {
 
     /// Takes the work of a tick with candidates.
     ///
-    /// * `lanes` - how many were given up or taken.
+    /// * `lanes` - lanes given up or taken.
     pub(super) fn note(&mut self, moved: usize, lanes: u64, work: &Work) {
         if work.rebuilds > 0 {
-            // A sort of all says nothing of the ticks after it.
+            // A sort of all does not predict the ticks after it.
             (self.ticks, self.mean) = (0, 0);
             return;
         }

@@ -1,5 +1,5 @@
-//! What the bodies of a block tell together, in one pass over their boxes: enough to know that none of them needs a
-//! look of its own.
+//! Summary of the bodies of a block, from one pass over their boxes: enough to decide that none of them needs a closer
+//! look.
 
 use super::curve::centre;
 use super::home::widen;
@@ -7,12 +7,12 @@ use super::ones;
 use super::tree::NO_BOUND;
 use crate::simd::boxes::{Down, Lanes, WIDTH, Work};
 
-/// The middles of the bodies of a block.
+/// The centres of the bodies of a block.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Glance {
     pub(super) sum: [f32; 3],
     pub(super) bodies: f32,
-    /// The part of space that they fill; upside down where there are none.
+    /// Their bounds; inverted if there are none.
     pub(super) spread: [f32; 6],
     /// The least mean side of a box.
     least_side: f32,
@@ -41,7 +41,7 @@ impl Glance {
         seen
     }
 
-    /// Whether no middle is farther outside a part of space than so many mean sides of its box.
+    /// Returns whether no centre is farther outside a region than `sides` times the least mean side of a box.
     pub(super) fn is_within(&self, part: &[f32; 6], sides: f32) -> bool {
         let mut far = 0.0;
         for k in 0..3 {
@@ -55,7 +55,7 @@ impl Glance {
     }
 }
 
-/// Sees the blocks of a quarter; nobody in those that it lacks.
+/// Summarizes the blocks of a quarter; missing blocks count as empty.
 pub(super) struct LookOver<'a> {
     pub(super) live: &'a [u16],
     pub(super) exact: &'a [[Down; WIDTH]],

@@ -1,6 +1,6 @@
-//! Where a body belongs: each block has a part of space, and who comes or moves away looks for a lane in a near one.
+//! The region of each block; a body that comes or moves away gets a lane in a near one.
 //!
-//! In: a box, the blocks' parts of space. Out: a free lane.
+//! In: a box, the regions of the blocks. Out: a free lane.
 
 use super::curve::centre;
 use super::fatten::outward;
@@ -10,11 +10,11 @@ use super::{BodySlot, Order, Proxies};
 use crate::ids::small;
 use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH};
 
-/// Where a block is no farther from a body than this, in mean sides of its box, the sixteen before and after are not
-/// asked.
+/// When a block is no farther from a body than this, in mean sides of its box, the sixteen blocks before and after are
+/// not tested.
 const NEAR_ENOUGH: f32 = 0.5;
 
-/// Nobody's parts of space.
+/// Empty regions.
 pub(super) const NO_HOMES: Boxes16 = Boxes16 {
     faces: {
         let [low, _, _, high, _, _] = NO_BOUND;
@@ -24,19 +24,19 @@ pub(super) const NO_HOMES: Boxes16 = Boxes16 {
 };
 
 impl Order {
-    /// The part of space of a block.
+    /// The region of a block.
     #[inline(always)]
     pub(super) fn home(&self, block: usize) -> [f32; 6] {
         self.homes[block / WIDTH].get(block % WIDTH)
     }
 
-    /// Sets the part of space of a block.
+    /// Sets the region of a block.
     #[inline(always)]
     pub(super) fn set_home(&mut self, block: usize, home: &[f32; 6]) {
         self.homes[block / WIDTH].set(block % WIDTH, home);
     }
 
-    /// Makes the part of space of a block hold a place.
+    /// Widens the region of a block to contain a point.
     pub(super) fn widen_home(&mut self, block: usize, place: &[f32; 3]) {
         let mut home = self.home(block);
         widen(&mut home, place);
@@ -52,7 +52,7 @@ impl Order {
         proxies: &P,
     ) -> Option<(u32, Down)> {
         let one = outward(lanes, proxies.aabb(slot), &self.origin);
-        // So near, the box hardly stretches the block.
+        // At this distance the box hardly stretches the block.
         let enough = one.mean_side() * NEAR_ENOUGH;
         let near = self.lane_near(&one.corners(), enough * enough);
         let rank = near
@@ -61,10 +61,10 @@ impl Order {
         Some((rank, one))
     }
 
-    /// A free lane near a box's place on the curve, in the block whose part of space is nearest of the sixteen where it
-    /// belongs, those before and those after; and how far that is, squared.
+    /// A free lane near a box's position on the curve: in the block with the nearest region among the sixteen where it
+    /// belongs, those before and those after; and the distance, squared.
     ///
-    /// * `enough` - a part of space that is no farther, squared, is as good as one that is nearer.
+    /// * `enough` - regions within this distance, squared, count as equally good.
     #[inline(always)]
     pub(super) fn lane_near(&self, one: &[f32; 6], enough: f32) -> Option<(f32, u32)> {
         let key = self.sorter.frame.key(one);
@@ -72,7 +72,7 @@ impl Order {
         let mine = after.saturating_sub(1) / WIDTH;
         let (class, middle) = (Sorter::class_of(key), centre(one));
         let mut best = (f32::INFINITY, None);
-        // Sixteen at a time: which has room and is nearest is a guess that fails.
+        // Sixteen at a time: which block has room and is nearest is unpredictable for branches.
         for quarter in [Some(mine), mine.checked_sub(1), Some(mine + 1)] {
             let Some(quarter) = quarter.filter(|quarter| quarter * WIDTH < self.sorted) else {
                 continue;
@@ -85,7 +85,7 @@ impl Order {
             if least < best.0 {
                 let at = far.iter().position(|far| *far <= least);
                 best = (least, at.map(|at| quarter * WIDTH + at));
-                // Of a body without end that is infinite: one with room must have been found.
+                // Infinite for an infinite body: one with room must have been found.
                 if least <= enough {
                     break;
                 }
@@ -99,12 +99,12 @@ impl Order {
         small(block * WIDTH) + (!self.live[block]).trailing_zeros()
     }
 
-    /// How far a place is, squared, from the parts of space of sixteen blocks; infinite for those of another class or
-    /// without a free lane.
+    /// Squared distances of a point from the regions of sixteen blocks; infinite for those of another class or without
+    /// a free lane.
     #[inline(always)]
     fn far_from_free(&self, place: &[f32; 3], quarter: usize, class: u64) -> [f32; WIDTH] {
         let blocks = quarter * WIDTH..(quarter * WIDTH + WIDTH).min(self.sorted);
-        // What lies beyond is no part of the order: the attic, and what was a block's before the last sort.
+        // Blocks beyond `sorted` are not part of the order: the attic, and leftovers from before the last sort.
         let mut live = [u16::MAX; WIDTH];
         live[..blocks.len()].copy_from_slice(&self.live[blocks.clone()]);
         let homes = &self.homes[quarter];
@@ -135,7 +135,7 @@ impl Order {
     }
 }
 
-/// Makes a part of space hold a place.
+/// Widens a region to contain a point.
 #[inline(always)]
 pub(super) fn widen(home: &mut [f32; 6], place: &[f32; 3]) {
     for k in 0..3 {
@@ -144,7 +144,7 @@ pub(super) fn widen(home: &mut [f32; 6], place: &[f32; 3]) {
     }
 }
 
-/// How far a place is from a part of space, squared; infinite where that is empty.
+/// Squared distance of a point from a region; infinite if the region is empty.
 #[inline(always)]
 pub(super) fn far_from(place: &[f32; 3], home: &[f32; 6]) -> f32 {
     let mut sum = 0.0;
@@ -173,7 +173,7 @@ mod tests {
         std::array::from_fn(|k| if k < 3 { at[k] } else { at[k - 3] + side })
     }
 
-    /// Blocks of two classes, a third of them full; what stands behind them holds every place.
+    /// Blocks of two classes, a third of them full; what is stored behind them contains every place.
     fn stand(random: &mut Random) -> Order {
         let mut order = Order::new(Level::Portable);
         let side = |at| if at < 20 { 40.0 } else { 1.0 };
@@ -215,7 +215,7 @@ mod tests {
                     .filter(|block| Sorter::class_of(order.keys[*block]) == Sorter::class_of(key))
                     .map(far)
                     .min_by(f32::total_cmp);
-                // Nothing is near enough: all three quarters are looked at.
+                // Nothing is near enough: all three quarters are tested.
                 let found = order.lane_near(&one, -1.0);
                 assert_eq!(
                     found.map(|(far, _)| far.to_bits()),

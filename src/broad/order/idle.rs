@@ -1,26 +1,26 @@
-//! Memory that lies idle: of many bodies it is given back.
+//! Unused memory: given back when there are many bodies.
 //!
-//! In: a change of the way, a tick that is over. Out: less memory; nothing else is told by it. Candidates and the
-//! search without them take half of it each, and a world of many bodies seldom changes from the one to the other, in a
-//! tick that lays all of them anyway. Lists that a tick fills once, as the first one does with every pair, are not kept
-//! at that length. Of fewer bodies all of it is kept, so that no tick makes any, until a crowd has been over for long.
+//! In: a change of mode, a finished tick. Out: less memory; results do not depend on it. Candidates and the search
+//! without them take half of the memory each, and a world of many bodies seldom changes from one to the other, and does
+//! so in a tick that lays out all bodies anyway. Lists that one tick fills, as the first one does with every pair, are
+//! not kept at that length. With fewer bodies all memory is kept, so that no tick allocates, until a crowd has been
+//! over for long.
 
 use super::afresh::Afresh;
 use super::cost::FAR;
 use super::mend::Mender;
 use super::{Order, moved, renew};
 
-/// A list of what changes in a tick keeps room for one entry for so many bodies, and up to twice as many: enough for
-/// all scenes of the bench but the fastest and those of tens of pairs a body, where a tick has other things to do for
-/// long.
+/// A list of changes of a tick keeps room for one entry per `KEPT` bodies, and up to twice that: enough for all scenes
+/// of the bench except the fastest and those with tens of pairs per body, where a tick is busy with other work.
 const KEPT: usize = 4;
 
-/// Whether there are so many bodies that what lies idle is given back.
+/// Returns whether there are so many bodies that unused memory is given back.
 pub(in crate::broad) fn is_thrifty(bodies: usize) -> bool {
     bodies > FAR
 }
 
-/// Empties a list of a tick, and gives back what is more than most ticks need.
+/// Clears a list of a tick, and gives back memory beyond what most ticks need.
 pub(in crate::broad) fn give_back<T>(list: &mut Vec<T>, bodies: usize) {
     list.clear();
     let kept = bodies / KEPT;
@@ -29,16 +29,16 @@ pub(in crate::broad) fn give_back<T>(list: &mut Vec<T>, bodies: usize) {
     }
 }
 
-/// Empties a list and gives its memory back, but for one entry. Freed whole it would be a sign to glibc that lists of
-/// this size come and go: the next ones then share one heap, and what is freed amid it stays with the process. A list
-/// that shrinks and grows has pages of its own.
+/// Clears a list and gives its memory back, except one entry. If it were freed whole, glibc would take that as a sign
+/// that lists of this size come and go: the next ones then share one heap, and memory freed in the middle of it stays
+/// with the process. A list that shrinks and grows has its own pages.
 pub(super) fn shed<T>(list: &mut Vec<T>) {
     list.clear();
     list.shrink_to(1);
 }
 
 impl Order {
-    /// Candidates were let go.
+    /// Candidates were dropped.
     pub(super) fn give_back_candidates(&mut self) {
         if !is_thrifty(self.len) {
             return;
@@ -56,16 +56,16 @@ impl Order {
         self.give_back_list();
     }
 
-    /// A crowd is over, for long.
+    /// A crowd has been over for long.
     pub(in crate::broad) fn give_back_crowd(&mut self) {
         let (entries, hits, bodies) = (self.entries.len(), self.hits, self.len);
-        // As much as a sort makes room for where there is less.
+        // A sort reserves at least this much anyway.
         self.entries.shrink_to(2 * entries + 4 * bodies);
         self.carried.shrink_to(2 * hits + 2 * bodies);
         self.found.shrink_to(bodies);
     }
 
-    /// Few moved: the list of candidates is let go.
+    /// Few bodies moved: the list of candidates is dropped.
     pub(super) fn give_back_list(&mut self) {
         self.listed = false;
         self.entries.clear();
@@ -76,7 +76,7 @@ impl Order {
         }
     }
 
-    /// Candidates are taken up again: what is learned of the ways stays.
+    /// Candidates are used again: what is known about the modes stays.
     pub(super) fn give_back_afresh(&mut self) {
         if !is_thrifty(self.len) {
             return;
@@ -98,7 +98,7 @@ impl Order {
         shed(reach);
     }
 
-    /// Bodies were sorted: that is seldom done, and not while lists are longest.
+    /// Bodies were sorted: that is rare, and does not coincide with the longest lists.
     pub(super) fn give_back_sort(&mut self) {
         if !is_thrifty(self.len) {
             return;

@@ -1,20 +1,20 @@
-//! Bodies that jump clear of their block, while bodies stay in their lanes: they get others, the rest stays as it is.
+//! Bodies that jump out of their block while other bodies keep their lanes: they get other lanes, the rest stays.
 //!
-//! Without candidates alone. A few bodies far from where they stood would stretch their blocks over the scene; to lay
-//! everything anew for them costs several times as much as to seat them.
+//! Only without candidates. A few bodies far from their old place would stretch their blocks over the scene; a new
+//! layout of everything for them costs several times as much as giving them lanes.
 
 use super::afresh::Afresh;
 use super::lay::Bound;
 use super::{BodySlot, MANY_CAME, NONE, Order, PairKey, Proxies, Tick, ones, parts, small};
 use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch};
 
-/// Bodies ahead whose boxes are asked for.
+/// Bodies ahead whose boxes are prefetched.
 const AHEAD: usize = 8;
 
 impl Order {
-    /// Gives who came and who jumped a lane; whether there was one for each.
+    /// Gives a lane to every body that came or jumped; returns whether there were enough.
     ///
-    /// * `jumped` - how many the boxes just taken say have jumped.
+    /// * `jumped` - number of bodies that jumped, by the boxes just taken.
     pub(super) fn seat_anew<P: Proxies>(&mut self, jumped: usize, tick: &Tick<'_, P>) -> bool {
         let came = self.homeless.len();
         if came + jumped == 0 {
@@ -41,8 +41,8 @@ impl Order {
         all
     }
 
-    /// Gives bodies without one a lane each, and brings the bounds of all blocks that changed up to date; whether there
-    /// was a lane for each. Who has one keeps it.
+    /// Gives each body without a lane one, and updates the bounds of all changed blocks; returns whether there were
+    /// enough. A body that has a lane keeps it.
     pub(super) fn seat_all<P: Proxies>(&mut self, bodies: &[BodySlot], proxies: &P) -> bool {
         let mut blocks = std::mem::take(&mut self.worklist);
         let level = self.level;
@@ -63,7 +63,7 @@ impl Order {
         all
     }
 
-    /// Takes the lanes of those that jumped away; notes them as homeless, and their blocks as changed.
+    /// Takes away the lanes of bodies that jumped; lists them as homeless and their blocks as changed.
     fn unseat(&mut self) {
         for block in 0..self.live.len() {
             let jumped = self.afresh.jumped[block];
@@ -82,8 +82,8 @@ impl Order {
         }
     }
 
-    /// Tells which pairs of bodies that jumped have parted. Those that have not are told as begun, which of a pair that
-    /// is stored means nothing.
+    /// Reports which pairs of bodies that jumped have parted. Those that still overlap are reported as begun, which has
+    /// no effect on stored pairs.
     pub(super) fn tell_jumped<P>(&mut self, tick: &mut Tick<'_, P>) {
         for (one, other) in self.carried.drain(..) {
             let ranks = [one, other].map(|slot| self.rank_of[slot as usize]);
@@ -95,7 +95,7 @@ impl Order {
     }
 }
 
-/// Gives bodies without one a lane each, and notes their blocks; whether there was a lane for each.
+/// Gives each body without a lane one, and lists their blocks; returns whether there were enough.
 struct Seat<'a, P> {
     order: &'a mut Order,
     bodies: &'a [BodySlot],

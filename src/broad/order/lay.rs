@@ -1,6 +1,6 @@
-//! Where bodies without candidates stand: they are laid along the curve, and every box is written to its lane.
+//! Lanes of bodies without candidates: they are laid out along the curve, and every box is written to its lane.
 //!
-//! In: every box. Out: lanes, the tree over their blocks, and how much more of space the blocks take than they did.
+//! In: every box. Out: lanes, the tree over their blocks, and how much the volume of the blocks has grown.
 
 use super::afresh::{Afresh, FRAME_TICKS};
 use super::curve::Frame;
@@ -13,13 +13,13 @@ use super::sort::{FILL, Sorter};
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, is_thrifty, ones, parts, small};
 use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work, prefetch};
 
-/// Boxes compared with a block in the time that laying a body anew takes.
+/// Laying out a body costs as much as this many comparisons of a box with a block.
 pub(super) const LAY_TESTS: u32 = 12;
-/// How many bodies ahead boxes are asked for.
+/// How many bodies ahead boxes are prefetched.
 const AHEAD: usize = 16;
 
 impl Order {
-    /// How many times more a block is met than when it was laid, in the mean, by the space it takes.
+    /// How many times more often a block is met than at its layout, on average, estimated from volumes.
     pub(super) fn grown(&self) -> f64 {
         let side = self.afresh.side;
         let (mut sum, mut count) = (0.0, 0.0);
@@ -33,7 +33,7 @@ impl Order {
         if count > 0.0 { sum / count } else { 1.0 }
     }
 
-    /// Deals the bodies to blocks anew, each block compact.
+    /// Sorts the bodies into blocks again, each block compact.
     pub(super) fn lay_anew<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
         self.afresh.presort.stop();
         let bodies = tick.members.bounded();
@@ -54,7 +54,7 @@ impl Order {
         }
         let mut sorter = std::mem::take(&mut self.sorter);
         self.clear_blocks(bodies);
-        // What is spoilt in a tick is not worth being dealt to compact blocks.
+        // A layout that is spoilt within a tick is not worth compact blocks.
         if self.afresh.spoilt == 0 {
             for (key, at) in sorter.sort(&boxes) {
                 let at = at as usize;
@@ -70,7 +70,7 @@ impl Order {
         self.close_blocks(bodies.len(), bodies.len());
     }
 
-    /// Bodies left: they give up their lanes, and their pairs are no difference.
+    /// Bodies left: they give up their lanes, and their pairs are not part of the difference.
     pub(super) fn leave_afresh(&mut self, left: &[BodySlot]) {
         self.afresh.presort.note_left(left.len());
         for slot in left {
@@ -88,7 +88,7 @@ impl Order {
         }
     }
 
-    /// Takes everything out of the blocks.
+    /// Removes everything from the blocks.
     pub(super) fn clear_blocks(&mut self, bodies: &[BodySlot]) {
         self.live.clear();
         self.keys.clear();
@@ -100,10 +100,10 @@ impl Order {
         }
     }
 
-    /// After the last body was dealt: the attic, the tree, and room for all.
+    /// Finishes a layout: the attic, the tree, and room for all.
     ///
-    /// * `dealt` - how many bodies were.
-    /// * `bodies` - how many there are, with those that are still to be seated.
+    /// * `dealt` - bodies with a lane.
+    /// * `bodies` - all bodies, including those that still need a lane.
     pub(super) fn close_blocks(&mut self, dealt: usize, bodies: usize) {
         self.sorted = self.live.len();
         self.len = dealt;
@@ -120,9 +120,9 @@ impl Order {
         self.bound_all(bodies);
     }
 
-    /// Bounds every block, and takes what they fill as what is usual from now on; who is seated later adds to it.
+    /// Computes the bounds of every block, which are the new baseline; bodies that get a lane later add to them.
     ///
-    /// * `bodies` - how many there are; room is made for as many.
+    /// * `bodies` - number of bodies to reserve memory for.
     fn bound_all(&mut self, bodies: usize) {
         let blocks = self.live.len();
         self.level.run(Bound {
@@ -145,7 +145,7 @@ impl Order {
             lanes.clear();
             lanes.resize(blocks, 0);
         }
-        // Who is seated anew in a tick, and where.
+        // Bodies that get a new lane in a tick, and where.
         let seats = bodies / MANY_CAME + 1;
         room(&mut self.homeless, seats);
         room(&mut self.worklist, 2 * seats);
@@ -157,11 +157,11 @@ impl Order {
         }
     }
 
-    /// Gives a body the next lane, or nobody: a lane is passed over for who is gone, so that the blocks stay those of
+    /// Gives a body the next lane, or leaves the lane empty for a body that is gone, so that the blocks stay those of
     /// the sort.
     ///
-    /// * `key` - of the stretch that it was sorted to.
-    /// * `fill` - bodies of a block.
+    /// * `key` - first key of the stretch that the body was sorted to.
+    /// * `fill` - bodies per block.
     #[inline]
     pub(super) fn deal_to(&mut self, key: u64, fill: usize, body: Option<(BodySlot, &[f32; 6])>) {
         let same = |first: &u64| Sorter::class_of(*first) == Sorter::class_of(key);
@@ -183,7 +183,7 @@ impl Order {
         self.fat[block].set(lane, one);
     }
 
-    /// Notes the space that each block takes.
+    /// Records the volume of each block.
     fn measure(&mut self) {
         let blocks = self.live.len();
         let (mut sum, mut count) = (0.0_f64, 0.0_f64);
@@ -206,14 +206,14 @@ impl Order {
     }
 }
 
-/// The space where the middle of a box with such sides meets a bound; none of an empty one.
+/// The volume in which the centre of a box with such sides meets a bound; 0 for an empty bound.
 fn reach(bound: &[f32; 6], side: f32) -> f32 {
     (0..3)
         .map(|k| (bound[k + 3] - bound[k] + side).max(0.0))
         .product()
 }
 
-/// Takes every box, in the order of the members, as corners.
+/// Reads every box, in the order of the members, as corners.
 struct TakeAll<'a, P> {
     origin: [f64; 3],
     bodies: &'a [BodySlot],
@@ -243,8 +243,7 @@ impl<P: Proxies> Work for TakeAll<'_, P> {
     }
 }
 
-/// Writes every box to its lane, and brings the tree up to date; returns how many lie clear of where their block
-/// was.
+/// Writes every box to its lane and updates the tree; returns how many lie clear of their block's old bound.
 pub(super) struct TakeLanes<'a, P> {
     pub(super) order: &'a mut Order,
     pub(super) proxies: &'a P,
@@ -277,7 +276,7 @@ impl<P: Proxies> Work for TakeLanes<'_, P> {
     }
 }
 
-/// Brings the bounds of some blocks, and the tree, up to date.
+/// Updates the bounds of some blocks, and the tree.
 pub(super) struct Bound<'a, B> {
     pub(super) order: &'a mut Order,
     /// Ascending.

@@ -1,8 +1,8 @@
-//! Which lanes of which blocks are candidates: one record for each two blocks whose boxes come near one another.
+//! Which lanes of which blocks are candidates: one record for each two blocks whose boxes are near each other.
 //!
-//! A record is two matrices of 16 by 16 bits: `cand` (the fat boxes meet) and `hit` (the boxes themselves overlapped at
-//! the last look). What begins and what ends is a difference of bits; a pair keeps its bit while both bodies keep
-//! their lanes, whatever is renewed around it, so no map from pairs to places is needed.
+//! A record is two matrices of 16 by 16 bits: `cand` (the fat boxes overlap) and `hit` (the boxes themselves overlapped
+//! at the last look). Begins and ends are differences of bits; a pair keeps its bit while both bodies keep their lanes,
+//! whatever is renewed around it, so no map from pairs to places is needed.
 
 use super::NONE;
 use super::idle::shed;
@@ -15,32 +15,32 @@ pub(super) type Matrix = [u16; WIDTH];
 /// No bit.
 pub(super) const EMPTY: Matrix = [0; WIDTH];
 
-/// The two matrices: rows are lanes of the lower block, bits those of the higher. Within one block only bits above
-/// the row's own.
+/// The two matrices: rows are lanes of the lower block, bits those of the higher. Within one block only bits above the
+/// row's own are used.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 pub(super) struct Bits {
-    /// The fat boxes meet.
+    /// The fat boxes overlap.
     pub(super) cand: Matrix,
     /// The boxes overlap; always within `cand`.
     pub(super) hit: Matrix,
 }
 
-/// Two blocks, the lower first, and where the record stands in the list of each.
+/// Two blocks, the lower first, and the index of the record in the list of each.
 #[derive(Clone, Copy, Debug)]
 struct Ends {
     blocks: [u32; 2],
     places: [u32; 2],
 }
 
-/// Records a block that room is made for at first: where few boxes overlap there are about five, and to grow by
+/// Records per block that memory is reserved for at first: where few boxes overlap there are about five, and growth by
 /// doubling would hold twice as many meanwhile.
 const RECORDS: usize = 6;
 
 /// Entries of a piece of a block's list.
 const PIECE: usize = 15;
 
-/// A piece of a block's list of records: only the first piece of a list may be part full.
+/// A piece of a block's list of records: only the first piece of a list may be partly filled.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(128))]
 struct Piece {
@@ -62,7 +62,7 @@ pub(super) struct Links {
 }
 
 impl Links {
-    /// Drops every record and makes lists for so many blocks.
+    /// Drops every record and makes empty lists for `blocks` blocks.
     pub(super) fn reset(&mut self, blocks: usize) {
         self.ends.clear();
         self.bits.clear();
@@ -78,7 +78,7 @@ impl Links {
         small(self.ends.len())
     }
 
-    /// Room for half as many records again, so that none is made in the ticks until the next sort.
+    /// Reserves half as many records again, so that the ticks until the next sort allocate nothing.
     pub(super) fn reserve(&mut self) {
         let blocks = self.heads.len();
         let (records, pieces) = (self.ends.len(), self.pieces.len());
@@ -99,7 +99,7 @@ impl Links {
         shed(&mut self.free_pieces);
     }
 
-    /// Room for the lists of so many blocks.
+    /// Reserves the lists of `blocks` blocks.
     pub(super) fn reserve_blocks(&mut self, blocks: usize) {
         room(&mut self.heads, blocks);
         room(&mut self.ends, RECORDS * blocks);
@@ -148,7 +148,7 @@ impl Links {
         }
     }
 
-    /// Asks for a block's list to come.
+    /// Prefetches a block's list.
     #[inline(always)]
     pub(super) fn ask(&self, block: u32) {
         if let Some(piece) = self.pieces.get(self.heads[block as usize] as usize) {
@@ -156,7 +156,8 @@ impl Links {
         }
     }
 
-    /// The record of two blocks; in the shorter of their lists, for a huge body's block is near all others.
+    /// The record of two blocks. Scans both lists in step up to the shorter one's end, as the block of a huge body is
+    /// near all others.
     pub(super) fn find(&self, a: u32, b: u32) -> Option<u32> {
         for (one, other) in self.of(a).zip(self.of(b)) {
             if one.0 == b {
@@ -195,7 +196,7 @@ impl Links {
         record
     }
 
-    /// Drops a record.
+    /// Removes a record.
     pub(super) fn remove(&mut self, record: u32) {
         let Ends { blocks, .. } = self.ends[record as usize];
         self.unlist(blocks[0], record, 0);
@@ -206,7 +207,7 @@ impl Links {
         self.free.push(record);
     }
 
-    /// Appends to a block's list; returns the place.
+    /// Appends to a block's list; returns the index.
     fn push(&mut self, block: u32, other: u32, record: u32) -> u32 {
         let head = self.heads[block as usize];
         let room = self
@@ -240,7 +241,7 @@ impl Links {
         at * LANES + small(k)
     }
 
-    /// Takes a record out of the list of one of its ends: the list's last entry takes its place.
+    /// Removes a record from the list of one of its blocks: the list's last entry takes its place.
     fn unlist(&mut self, block: u32, record: u32, end: usize) {
         let place = self.ends[record as usize].places[end];
         let head = self.heads[block as usize];
@@ -260,7 +261,7 @@ impl Links {
         hole.records[place as usize % WIDTH] = moved;
         let ends = &mut self.ends[moved as usize];
         for side in 0..2 {
-            // A record within one block stands in one list, under both ends.
+            // A record within one block is in one list, for both ends.
             if ends.blocks[side] == block {
                 ends.places[side] = place;
             }
@@ -305,7 +306,8 @@ impl Links {
     }
 }
 
-/// Goes through the list of a block. A type of its own and no closures, so that it is built into loops for wide lanes.
+/// Iterates over the list of a block. A type of its own and no closures, so that it is inlined into loops for wide
+/// lanes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Listed<'a> {
     pieces: &'a [Piece],
@@ -330,14 +332,13 @@ impl Iterator for Listed<'_> {
     }
 }
 
-/// Makes room in a list for so many entries in all.
+/// Reserves room in a list for `len` entries in all.
 pub(super) fn room<T>(list: &mut Vec<T>, len: usize) {
     list.reserve(len.saturating_sub(list.len()));
 }
 
-/// Room for what a list of so many entries may grow to until the next sort: half as many again, and as many as `some`.
-/// What is missing is made in twice that measure, so that a sort which finds a few more entries than the last one makes
-/// none.
+/// Reserves what a list of `len` entries may grow to until the next sort: half as many again, plus `some`. If more is
+/// needed, twice that is reserved, so that a sort which finds a few more entries than the last one allocates nothing.
 pub(super) fn spare<T>(list: &mut Vec<T>, len: usize, some: usize) {
     if list.capacity() < len + len / 2 + some {
         room(list, 2 * len + 2 * some);

@@ -1,35 +1,35 @@
-//! Takes the new boxes of moved bodies and finds who left its fat box.
+//! Takes the new boxes of moved bodies and finds bodies that left their fat box.
 
 use super::fatten::HORIZON;
 use super::{BodySlot, NONE, Order, Proxies, Tick, ones, parts, small};
 use crate::simd::boxes::{Down, Held, Lanes, WIDTH, Work, prefetch};
 
-/// Lanes that moved and have lived for half a round are renewed at their block's turn, or with a lane of their block
-/// that must be: the walk down the tree is then shared, and they would be next.
+/// Lanes that moved and whose fat box is at least this old are renewed at their block's turn, or together with a lane
+/// of their block that must be: they share the walk down the tree, and would be next anyway.
 const ALONG_AGE: u32 = HORIZON / 2;
 
-/// Lanes of bodies that are at rest for long are renewed at one in so many turns of their block.
+/// Lanes of bodies at rest for long are renewed only at one in this many turns of their block.
 const PATIENT_TURNS: u32 = 16;
-/// Bodies that are at rest for long are renewed only where there is more than one candidate that is not sure for so
-/// many bodies: else there is little that it could make sure.
+/// Bodies at rest for long are renewed only where there is more than one uncertain candidate per `OPEN` bodies:
+/// otherwise little can be gained.
 const OPEN: usize = 4;
 
-/// Stretches of blocks at least, that the turns go round; a stretch is a quarter at most.
+/// Least number of stretches of blocks that the turns cycle through; a stretch is a quarter at most.
 const STRETCHES: usize = 3 * HORIZON as usize;
 
-/// One in so many did not move, and all are taken.
+/// If no more than one in this many bodies did not move, all boxes are taken.
 const NEARLY_ALL: usize = 16;
 
-/// How many blocks ahead boxes are asked for: one box takes some 5 ns, memory ten to thirty times as long. One with
-/// each, for a processor waits for only so many at a time.
+/// How many blocks ahead boxes are prefetched: taking a box costs some 5 ns, a memory access ten to thirty times as
+/// much. One prefetch per box taken, as a processor handles only so many at a time.
 const AHEAD: usize = 2;
-/// Nobody.
+/// A block without bodies.
 const NOBODY: [u32; WIDTH] = [NONE; WIDTH];
-/// How many bodies ahead, where few moved, what is known of them is.
+/// When few moved: how many bodies ahead their data are prefetched.
 const AHEAD_BODIES: usize = 8;
 
 impl Order {
-    /// Takes boxes; notes who must be renewed in `renewing` and `worklist`.
+    /// Takes boxes; lists lanes to renew in `renewing` and `worklist`.
     pub(super) fn load<P: Proxies>(&mut self, tick: &Tick<'_, P>, many: bool) {
         self.worklist.clear();
         if self.stands(many) {
@@ -39,7 +39,7 @@ impl Order {
         self.stir(tick.proxies);
         if many {
             if tick.moved.len() + tick.moved.len() / NEARLY_ALL >= self.len {
-                // As good as all: a box that did not change is taken again, which costs less than to find out which.
+                // Nearly all: taking an unchanged box again costs less than finding out which did not change.
                 self.dirty.copy_from_slice(&self.live);
             } else {
                 for slot in tick.moved {
@@ -58,7 +58,7 @@ impl Order {
         }
     }
 
-    /// Notes lanes to renew.
+    /// Marks lanes to renew.
     #[inline(always)]
     pub(super) fn mark(&mut self, block: usize, lanes: u16) {
         if self.renewing[block] == 0 && lanes != 0 {
@@ -67,9 +67,9 @@ impl Order {
         self.renewing[block] |= lanes;
     }
 
-    /// Ticks until it is a block's turn. While many move, each tick renews a few stretches of the order, so that all
-    /// ticks cost the same, wherever large or crowded bodies stand, and most neighbours are renewed together: then one
-    /// of two asks for both.
+    /// Ticks until a block's turn. While many move, each tick renews a few stretches of the order, so that all ticks
+    /// cost the same, wherever large or crowded bodies are, and most neighbours are renewed together: then one query
+    /// serves both.
     #[inline(always)]
     fn until_turn(&self, block: usize) -> u32 {
         let turn = small(block / self.stretch()) % HORIZON;
@@ -82,8 +82,8 @@ impl Order {
         (self.live.len() / STRETCHES).clamp(1, WIDTH)
     }
 
-    /// Whether it is a quarter's turn. Where a stretch is a quarter it is its blocks' turn too; of fewer blocks each
-    /// quarter has a turn of its own, and no tick all of them.
+    /// Returns whether it is a quarter's turn. Where a stretch is a quarter it is also its blocks' turn; with fewer
+    /// blocks each quarter still has its own turn, and no tick has all of them.
     pub(super) fn is_quarter_due(&self, quarter: usize) -> bool {
         small(quarter) % HORIZON == self.tick % HORIZON
     }
@@ -96,20 +96,21 @@ impl Order {
         starts.flat_map(move |start| start..(start + stretch).min(blocks))
     }
 
-    /// Whether it is a block's turn.
+    /// Returns whether it is a block's turn.
     pub(super) fn is_due(&self, block: usize) -> bool {
         self.until_turn(block) == 0
     }
 
-    /// Ticks that a fat box made now is to last: until its block's turn, or the one after.
+    /// Ticks that a fat box made now shall last: until its block's turn, or the one after.
     #[inline(always)]
     pub(super) fn horizon(&self, block: usize) -> u32 {
         let left = self.until_turn(block);
-        // One more, for the box of the tick at hand must be left after the turn only.
+        // One more: the box of this tick may be left only after the turn.
         left + 1 + if left < ALONG_AGE { HORIZON } else { 0 }
     }
 
-    /// Of the moved lanes of a block those to be renewed along: old enough and about to leave in a round, or calmed.
+    /// The moved lanes of a block that are to be renewed along: old enough and about to leave within a round, or
+    /// calmed.
     #[inline(always)]
     pub(super) fn along<L: Lanes>(&self, lanes: L, block: usize, moved: u16) -> u16 {
         let mut chosen = 0;
@@ -126,8 +127,8 @@ impl Order {
         chosen
     }
 
-    /// Whether those of a block that are at rest for long may be renewed at this turn: where that may make candidates
-    /// sure, and not in one turn, for a pile comes to rest at once.
+    /// Returns whether bodies of a block at rest for long may be renewed at this turn: where that may make candidates
+    /// certain, and spread over turns, for a pile comes to rest at once.
     #[inline(always)]
     fn is_patient(&self, block: usize) -> bool {
         let many_open = self.entries.len() * OPEN > self.len;
@@ -135,7 +136,7 @@ impl Order {
         many_open && turn.is_multiple_of(PATIENT_TURNS)
     }
 
-    /// The lanes of a block that may be renewed along: those old enough whose bodies are not at rest, and at times all.
+    /// The lanes of a block that may be renewed along: old enough with bodies not at rest, and at some turns all.
     #[inline(always)]
     pub(super) fn moving(&self, block: usize) -> u16 {
         let mut chosen = 0;
@@ -148,7 +149,7 @@ impl Order {
         chosen
     }
 
-    /// Writes the box of a lane; returns whether its fat box still holds it.
+    /// Writes the box of a lane; returns whether its fat box still contains it.
     #[inline(always)]
     pub(super) fn take<L: Lanes, P: Proxies>(
         &mut self,
@@ -162,7 +163,7 @@ impl Order {
     }
 }
 
-/// Writes the box of a body; returns whether its fat box still holds it.
+/// Writes the box of a body; returns whether its fat box still contains it.
 #[inline(always)]
 fn take<L: Lanes, P: Proxies>(
     lanes: L,
@@ -176,8 +177,8 @@ fn take<L: Lanes, P: Proxies>(
     lanes.take(corners, origin, held, exact)
 }
 
-/// The bodies of a block, and of one some blocks ahead: while a box is taken, another is asked for, since those of the
-/// world stand in another order.
+/// The bodies of a block, and of one some blocks ahead: while a box is taken another is prefetched, since boxes of the
+/// world are stored in another order.
 #[derive(Clone, Copy)]
 pub(super) struct Taking<'a> {
     slots: &'a [u32; WIDTH],
@@ -195,7 +196,7 @@ impl<'a> Taking<'a> {
         }
     }
 
-    /// Asks for the holds of the block ahead.
+    /// Prefetches the holds of the block ahead.
     #[inline(always)]
     fn ask(self, held: &[Held]) {
         for ahead in self.ahead {
@@ -205,7 +206,7 @@ impl<'a> Taking<'a> {
         }
     }
 
-    /// The body of a lane in use; its box is about to be taken.
+    /// The body of a lane in use, whose box is taken next.
     #[inline(always)]
     pub(super) fn slot<P: Proxies>(self, lane: usize, proxies: &P) -> BodySlot {
         let ahead = self.ahead[lane];
@@ -216,7 +217,7 @@ impl<'a> Taking<'a> {
     }
 }
 
-/// Block by block, the dirty lanes of each.
+/// Block by block, the changed lanes of each.
 struct LoadBlocks<'a, 'b, P> {
     order: &'a mut Order,
     tick: &'a Tick<'b, P>,
@@ -284,7 +285,7 @@ impl<P: Proxies> Work for LoadBodies<'_, '_, P> {
                 order.mark(block, 1 << lane);
             }
         }
-        // Blocks in ascending order: the tree is refitted in it.
+        // Blocks in ascending order: the tree is refitted in this order.
         order.worklist.sort_unstable();
     }
 }

@@ -1,9 +1,8 @@
 //! Compares the boxes of candidates and reports the pairs that began and parted.
 //!
-//! When many bodies move, the candidates are gone through as a flat list, in memory order, without a branch that one
-//! could guess wrong; the list is mended as bodies are renewed, by new entries at its end and by ages that tell the old
-//! ones dead. Pairs that are sure for as long as both bodies keep to their holds are not listed. When few move the list
-//! is let go (`moved`).
+//! When many bodies move, candidates are scanned as a flat list, in memory order, without unpredictable branches. As
+//! bodies are renewed, new entries are appended to the list, and ages mark the old ones dead. Pairs that are certain as
+//! long as both bodies stay in their holds are not listed. When few move the list is dropped (`moved`).
 
 use super::entry::{Entry, ages};
 use super::fatten::outward;
@@ -12,19 +11,19 @@ use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, is_thrifty, ones
 use crate::ids::PairKey;
 use crate::simd::boxes::{Boxes16, Down, Hold, LANES, Lanes, WIDTH, Work, prefetch, slack};
 
-/// What a look at an entry found; the place of the entry, and:
+/// Result of comparing an entry; `at` is the entry's index.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Found {
     at: u32,
-    /// Whether they overlap now; `None` where rounding leaves it open.
+    /// Whether the boxes overlap now; `None` where rounding leaves it open.
     now: Option<bool>,
 }
 
-/// Entries ahead whose boxes are asked for.
+/// Entries ahead whose boxes are prefetched.
 const AHEAD: usize = 24;
 
 impl Order {
-    /// Looks at every candidate, by the flat list.
+    /// Compares every candidate, using the flat list.
     pub(super) fn look_at_all<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
         if !self.listed {
             let level = self.level;
@@ -72,20 +71,20 @@ impl Order {
             let [a, b] = ranks.map(|rank| small(parts(rank).0));
             let record = self.links.find(a, b);
             debug_assert!(record.is_some(), "what is listed has a record");
-            // The matrix holds the truth: a pair that changed its lanes was restored there.
+            // The matrix decides: a pair that changed its lanes was restored there.
             if let Some(record) = record {
                 self.put_hit(record, ranks, now, tick);
             }
         }
         self.found = found;
-        // The first looks after a sort are at many more than are listed once bodies have learned their cores.
+        // The first looks after a sort have far more entries than there are once bodies have learned their cores.
         let len = self.entries.len() + self.len / 4;
         if is_thrifty(self.len) && self.entries.capacity() > 2 * len {
             self.entries.shrink_to(len);
         }
     }
 
-    /// Sets whether a candidate overlaps, and tells of it where it did not as now.
+    /// Sets whether a candidate overlaps, and reports a change.
     ///
     /// * `ranks` - the lower first.
     pub(super) fn put_hit<P>(
@@ -111,7 +110,7 @@ impl Order {
         told.push(PairKey::new(one, other));
     }
 
-    /// Lists some candidates of a record; those that are sure now overlap, and are told if they did not.
+    /// Lists some candidates of a record; certain pairs are not listed but set as overlapping, and reported if new.
     #[inline(always)]
     pub(super) fn list_bits<L: Lanes>(
         &mut self,
@@ -149,15 +148,15 @@ impl Order {
     }
 }
 
-/// Whether the f64 boxes of the bodies at two ranks overlap.
+/// Returns whether the f64 boxes of the bodies at two ranks overlap.
 pub(super) fn overlap<P: Proxies>(slot_of: &[u32], ranks: [u32; 2], proxies: &P) -> bool {
     let [a, b] = ranks.map(|rank| proxies.aabb(BodySlot(slot_of[rank as usize])));
     a.overlaps(b)
 }
 
-/// Whether a pair surely is as it was: without a branch on how that was, which is as good as random.
+/// Returns whether a pair is certainly unchanged; no branch on its former state, which is unpredictable.
 ///
-/// * `apart`, `sure` - as [`Lanes::parts`] tells.
+/// * `apart`, `sure` - results of [`Lanes::parts`].
 #[inline(always)]
 pub(super) fn is_as_before(hit: bool, (apart, sure): (bool, bool)) -> bool {
     (hit & sure) | (!hit & apart)
@@ -169,7 +168,8 @@ pub(super) fn verdict((apart, sure): (bool, bool)) -> Option<bool> {
     if apart | sure { Some(sure) } else { None }
 }
 
-/// What the f64 box of a body that keeps to its hold is sure to hold: the core, less what rounding may have added.
+/// The region that the f64 box of a body inside its hold certainly contains: the core, less what rounding may have
+/// added.
 #[inline(always)]
 pub(super) fn sure(hold: &Hold) -> [f32; 6] {
     let (fat, core) = (hold.fat.corners(), hold.core.corners());
@@ -222,16 +222,16 @@ impl Work for ListAll<'_> {
     }
 }
 
-/// Where the boxes of entries are.
+/// Where the boxes of entries are read from.
 trait Source {
     /// The box at a rank.
     fn get<L: Lanes>(&self, lanes: L, rank: u32) -> Down;
 
-    /// Asks for a box to come.
+    /// Prefetches a box.
     fn ask(&self, rank: u32);
 }
 
-/// By rank.
+/// Stored boxes, by rank.
 struct Stored<'a>(&'a [Down]);
 
 impl Source for Stored<'_> {
@@ -246,7 +246,7 @@ impl Source for Stored<'_> {
     }
 }
 
-/// The world itself: what is stored lags (`stand`).
+/// The world itself: used while stored boxes lag (`stand`).
 struct OfWorld<'a, P> {
     slot_of: &'a [u32],
     proxies: &'a P,
@@ -257,7 +257,7 @@ impl<P: Proxies> Source for OfWorld<'_, P> {
     #[inline(always)]
     fn get<L: Lanes>(&self, lanes: L, rank: u32) -> Down {
         match self.slot_of[rank as usize] {
-            // Of a dead entry.
+            // A dead entry.
             NONE => Down::EMPTY,
             slot => outward(lanes, self.proxies.aabb(BodySlot(slot)), &self.origin),
         }
@@ -272,7 +272,7 @@ impl<P: Proxies> Source for OfWorld<'_, P> {
     }
 }
 
-/// One pass over the list: drops the dead, finds what changed.
+/// One pass over the list: drops dead entries, finds changes.
 struct Look<'a, S> {
     boxes: S,
     /// By rank.
@@ -303,7 +303,7 @@ impl<S: Source> Work for Look<'_, S> {
             let [a, b] = entry.ranks();
             let alive = ages(aged[a as usize], aged[b as usize]) == entry.ages();
             entries[kept] = entry;
-            // No closure: it would be built without the instructions of the level.
+            // No closure: it would be compiled without the instructions of the level.
             let (a, b) = (boxes.get(lanes, a), boxes.get(lanes, b));
             let parts = lanes.parts(&a, &b);
             if alive & !is_as_before(entry.is_hit(), parts) {

@@ -1,8 +1,8 @@
-//! Keeps the order good while bodies move, a little in each tick, so that everything is seldom sorted anew.
+//! Keeps the order good while bodies move, a little in each tick, so that sorting everything again is rare.
 //!
-//! Sixteen blocks that stand side by side share a quarter: the part of space that their bodies filled after the last
-//! sort of all. It follows what its bodies do together. A body that has left its quarter moves to a lane in another;
-//! within a quarter the bodies are dealt to the blocks anew when these have spread.
+//! Sixteen consecutive blocks form a quarter. Its region is what their bodies filled after the last sort of all; it
+//! follows the common motion of its bodies. A body that has left its quarter moves to a lane in another; within a
+//! quarter the bodies are dealt to the blocks again when the blocks have spread.
 
 use super::curve::centre;
 use super::fatten::Gait;
@@ -14,18 +14,19 @@ use super::tree::NO_BOUND;
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, ones, small};
 use crate::simd::boxes::{Boxes16, Down, WIDTH};
 
-/// A body farther outside its quarter than so many of its mean sides looks for another block.
+/// A body farther outside its quarter than this, in its mean sides, looks for another block.
 const DRIFT_SIDES: f32 = 0.5;
-/// A body moves to a block that is so many times nearer than its own part of space, by squares of distances: a lane
-/// changed costs a microsecond or two. With less, lanes change for little; with more, blocks grow long by who stays.
+/// A body moves to a block whose squared distance is this many times smaller than that to its own region: a lane change
+/// costs one or two microseconds. With less, lanes change for little gain; with more, bodies that stay stretch their
+/// blocks.
 const NEARER: f32 = 4.0;
-/// Blocks whose bodies have spread so much over what they were dealt are dealt anew: that costs about as much as
-/// renewing all of them once more, and blocks that are so much longer meet twice as many others.
+/// Blocks whose bodies spread by this factor since they were dealt are dealt again: that costs about as much as
+/// renewing all of them once more, and blocks this much longer meet twice as many others.
 const MIXED: f32 = 1.2;
-/// Blocks whose bodies overlap more others than this, a body, are not dealt anew: each overlap is carried to the new
+/// Blocks whose bodies have more overlaps than this, per body, are not dealt again: each overlap is carried to the new
 /// lanes, and that costs more than it saves.
 const CROWD: usize = 128;
-/// Least bodies of a block that is dealt anew: with fewer the blocks would be many and empty.
+/// Least bodies of a block that is dealt again: with fewer there would be many nearly empty blocks.
 const FILL_LEAST: usize = 8;
 
 /// A body on its way to another lane.
@@ -36,7 +37,7 @@ struct Seat {
     gait: Gait,
 }
 
-/// Memory kept over calls.
+/// Memory kept across calls.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Mender {
     seats: Vec<Seat>,
@@ -45,7 +46,7 @@ pub(super) struct Mender {
 }
 
 impl Mender {
-    /// Room for the quarters of any tick.
+    /// Reserves memory for the quarters of any tick.
     pub(super) fn reserve(&mut self, records: usize) {
         room(&mut self.seats, WIDTH * WIDTH);
         room(&mut self.middles, WIDTH * WIDTH);
@@ -54,7 +55,7 @@ impl Mender {
 }
 
 impl Order {
-    /// Lanes of a block that are to be renewed and whose bodies have jumped clear of its bound.
+    /// Lanes of a block that are to be renewed and whose bodies have jumped out of its bound.
     fn jumped_clear(&self, block: usize) -> u16 {
         let bound = self.tree.bound(block);
         let mut clear = 0;
@@ -66,8 +67,8 @@ impl Order {
         clear
     }
 
-    /// Whether so many bodies came or jumped clear of their blocks that to sort all anew costs less than to seat each
-    /// of them.
+    /// Returns whether so many bodies came or jumped out of their blocks that sorting all again costs less than giving
+    /// each a lane.
     pub(super) fn have_scattered(&self, bodies: usize) -> bool {
         let few = bodies / MANY_CAME;
         let mut count = self.homeless.len();
@@ -84,7 +85,7 @@ impl Order {
         count > few
     }
 
-    /// Bodies that jumped clear of their block's bound give up their lanes, to stand where they belong.
+    /// Bodies that jumped out of their block's bound give up their lanes, to get one elsewhere.
     pub(super) fn rehome(&mut self) {
         for at in 0..self.worklist.len() {
             let block = self.worklist[at] as usize;
@@ -96,9 +97,9 @@ impl Order {
         }
     }
 
-    /// Of the bodies that are renewed sends those on to a nearer block that have gone farther from their block's part
-    /// of space than that is long: a block that kept a traveller would become as long as its way, and everybody's
-    /// queries would meet it. For where few move: the quarters are not looked after then.
+    /// Moves renewed bodies to a nearer block if they are farther from their block's region than it is long: a block
+    /// that kept a traveller would become as long as its path, and every query would meet it. Used when few move, as
+    /// quarters are not mended then.
     pub(super) fn send_on(&mut self) {
         for at in 0..self.worklist.len() {
             let block = self.worklist[at] as usize;
@@ -116,8 +117,7 @@ impl Order {
         }
     }
 
-    /// Looks after the quarters whose turn it is: who has left one moves, and those that have got mixed up are dealt
-    /// anew.
+    /// Mends the quarters whose turn it is: bodies that have left one move, and a mixed-up quarter is dealt again.
     pub(super) fn mend<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
         for quarter in 0..self.quarters.len() {
             let first = quarter * WIDTH;
@@ -136,7 +136,7 @@ impl Order {
             if drifted {
                 seen = self.look_over(quarter);
             }
-            // A quarter on the border of two classes is dealt in part.
+            // If two classes meet in a quarter, only its first class is dealt.
             let class = |block: usize| Sorter::class_of(self.keys[block]);
             let blocks = first..(first + WIDTH).min(self.sorted);
             let same = blocks.take_while(|block| class(*block) == class(first));
@@ -148,7 +148,7 @@ impl Order {
         }
     }
 
-    /// What the bodies of each block of a quarter tell together.
+    /// Summary of the bodies of each block of a quarter.
     fn look_over(&self, quarter: usize) -> [Glance; WIDTH] {
         let first = quarter * WIDTH;
         let live = &self.live[first..(first + WIDTH).min(self.live.len())];
@@ -156,8 +156,8 @@ impl Order {
         self.level.run(LookOver { live, exact })
     }
 
-    /// Shifts a quarter and its blocks' parts of space along with the middle of its bodies: what all do together mixes
-    /// nothing.
+    /// Shifts the regions of a quarter and its blocks with the centre of its bodies: common motion does not mix them
+    /// up.
     fn follow(&mut self, quarter: usize, seen: &[Glance; WIDTH]) {
         let (mut sum, mut bodies) = ([0.0_f32; 3], 0.0_f32);
         for block in seen {
@@ -171,7 +171,7 @@ impl Order {
         }
         let now = sum.map(|sum| sum / bodies);
         let before = std::mem::replace(&mut self.middles[quarter], now);
-        // Not known after a sort.
+        // Unknown after a sort.
         if before[0].is_nan() {
             return;
         }
@@ -179,7 +179,7 @@ impl Order {
         if by.iter().any(|by| !by.is_finite()) {
             return;
         }
-        // An empty part of space is infinite, and stays what it is.
+        // An empty region is infinite, and is unchanged by this.
         let (homes, quarter) = (&mut self.homes[quarter], &mut self.quarters[quarter]);
         for (k, faces) in homes.faces.iter_mut().enumerate() {
             quarter[k] += by[k % 3];
@@ -189,8 +189,8 @@ impl Order {
         }
     }
 
-    /// Moves the bodies of a block that another, with a free lane, is much nearer to than their quarter; whether there
-    /// were any.
+    /// Moves bodies of a block for which another block with a free lane is much nearer than their quarter; returns
+    /// whether there were any.
     fn drift(&mut self, block: usize) -> bool {
         let mut drifted = false;
         for lane in ones(self.live[block]) {
@@ -211,7 +211,8 @@ impl Order {
         drifted
     }
 
-    /// Moves a body to a lane of a block that is much nearer than `far`, squared, where one has room; whether there is.
+    /// Moves a body to a block with a free lane whose distance is much less than `far`, squared; returns whether there
+    /// is one.
     fn move_nearer(&mut self, from: usize, far: f32) -> bool {
         let boxed = self.exact[from];
         let nearer = self.lane_near(&boxed.corners(), 0.0);
@@ -227,9 +228,9 @@ impl Order {
         true
     }
 
-    /// Whether the blocks have spread over much more space than when they were dealt.
+    /// Returns whether the blocks have spread over much more space than when they were dealt.
     ///
-    /// * `seen` - of the blocks from `from` on.
+    /// * `seen` - summaries of the blocks from `from` on.
     fn is_mixed(&self, from: usize, seen: &[Glance]) -> bool {
         let extent = |home: &[f32; 6]| {
             (0..3)
@@ -244,7 +245,8 @@ impl Order {
         now > dealt * MIXED
     }
 
-    /// Whether the bodies of some blocks overlap so many others that dealing them anew costs more than it saves.
+    /// Returns whether the bodies of some blocks have so many overlaps that dealing them again costs more than it
+    /// saves.
     fn is_crowd(&self, from: usize, to: usize) -> bool {
         let bodies: usize = self.live[from..to]
             .iter()
@@ -255,7 +257,7 @@ impl Order {
         rows.map(|row| row.count_ones() as usize).sum::<usize>() > bodies * CROWD
     }
 
-    /// Deals the bodies of some blocks to the same blocks anew, each block compact. Their overlaps are carried.
+    /// Deals the bodies of some blocks to the same blocks again, each block compact. Their overlaps are carried.
     fn deal(&mut self, from: usize, to: usize) {
         let mut mender = std::mem::take(&mut self.mender);
         mender.seats.clear();
@@ -289,7 +291,7 @@ impl Order {
         self.mender = mender;
     }
 
-    /// Remembers the overlaps of a block and drops its records.
+    /// Saves the overlaps of a block and removes its records.
     fn carry_block(&mut self, block: usize, records: &mut Vec<u32>) {
         records.clear();
         for (other, record) in self.links.of(small(block)) {
@@ -312,7 +314,7 @@ impl Order {
         }
     }
 
-    /// Empties a block that has no records. Its bound is taken anew in this tick.
+    /// Empties a block that has no records. Its bound is recomputed in this tick.
     fn vacate(&mut self, block: usize) {
         for lane in ones(self.live[block]) {
             let rank = block * WIDTH + lane;

@@ -1,7 +1,7 @@
-//! Which lanes of which blocks overlap, found anew: a matrix of bits for each two blocks with any.
+//! Which lanes of which blocks overlap, found from scratch: a bit matrix for each two blocks with any overlap.
 //!
-//! In: boxes in their lanes, the tree over the blocks. Out: the overlaps of a tick in the order of blocks, so that
-//! those of two ticks with the same lanes differ by their bits alone.
+//! In: boxes in their lanes, the tree over the blocks. Out: the overlaps of a tick in block order, so that two ticks
+//! with the same lanes differ only in bits.
 
 use super::bits::{Gathered, words};
 use super::idle::shed;
@@ -13,13 +13,14 @@ use crate::simd::boxes::{Lanes, Level, Portable, WIDTH, Work};
 /// The overlaps of a tick.
 #[derive(Debug, Default)]
 pub(super) struct Met {
-    /// By block: where its records begin; and where the last ends.
+    /// By block: where its records begin; one more entry for the end of the last.
     firsts: Vec<u32>,
-    /// By record: the other block, which is not before its own. Ascending within a block.
+    /// By record: the other block, which is not before the record's own. Ascending within a block.
     others: Vec<u32>,
-    /// By record: lanes of the other block, by lane of its own. Within one block only bits above the row's own.
+    /// By record: lanes of the other block, by lane of its own. Within one block only bits above the row's own are
+    /// used.
     hits: Vec<Matrix>,
-    /// Bits in all of them.
+    /// Number of bits in all of them.
     count: usize,
 }
 
@@ -30,7 +31,7 @@ impl Clone for Met {
         met
     }
 
-    /// Keeps the memory.
+    /// Reuses the memory.
     fn clone_from(&mut self, from: &Self) {
         self.firsts.clone_from(&from.firsts);
         self.others.clone_from(&from.others);
@@ -40,7 +41,7 @@ impl Clone for Met {
 }
 
 impl Met {
-    /// Without any.
+    /// Clears it.
     pub(super) fn clear(&mut self) {
         self.firsts.clear();
         self.others.clear();
@@ -56,15 +57,15 @@ impl Met {
         shed(&mut self.hits);
     }
 
-    /// Room for more than it, or another of its size, holds: how many records there are differs from tick to tick, and
-    /// room is made when their number grows.
+    /// Reserves room for more than it, or another of its size, holds: the number of records varies from tick to tick,
+    /// and memory grows with it.
     pub(super) fn spare_for(&mut self, records: usize, blocks: usize) {
         room(&mut self.firsts, blocks + 1);
         spare(&mut self.others, records, blocks);
         spare(&mut self.hits, records, blocks);
     }
 
-    /// Puts the records of the blocks that follow behind its own.
+    /// Appends the records of the following blocks.
     pub(super) fn append(&mut self, next: &Self) {
         let before = small(self.len());
         self.firsts.pop();
@@ -74,12 +75,12 @@ impl Met {
         self.count += next.count;
     }
 
-    /// Records.
+    /// Number of records.
     pub(super) fn len(&self) -> usize {
         self.others.len()
     }
 
-    /// Blocks.
+    /// Number of blocks.
     pub(super) fn blocks(&self) -> usize {
         self.firsts.len().saturating_sub(1)
     }
@@ -90,19 +91,19 @@ impl Met {
         self.firsts[block] as usize..self.firsts[block + 1] as usize
     }
 
-    /// What follows belongs to the next block.
+    /// Begins the next block.
     #[inline(always)]
     pub(super) fn open_block(&mut self) {
         self.firsts.push(small(self.others.len()));
     }
 
-    /// Records of the block at hand; those that hold any overlap are kept. Overlaps are counted by [`Met::add`].
+    /// Adds records of the current block; those with any overlap are kept. Overlaps are counted by [`Met::add`].
     #[inline(always)]
     pub(super) fn push_all<'a>(
         &mut self,
         records: impl ExactSizeIterator<Item = (u32, &'a Matrix)>,
     ) {
-        // Which hold any is a guess that fails: all are written, and those without are written over.
+        // Which records have an overlap is unpredictable: all are written, and empty ones are overwritten.
         let mut kept = self.others.len();
         self.others.resize(kept + records.len(), 0);
         self.hits.resize(kept + records.len(), EMPTY);
@@ -115,7 +116,7 @@ impl Met {
         self.hits.truncate(kept);
     }
 
-    /// Counts overlaps.
+    /// Adds to the count of overlaps.
     #[inline(always)]
     pub(super) fn add(&mut self, overlaps: usize) {
         self.count += overlaps;
@@ -130,13 +131,13 @@ impl Met {
         Some((mine.start + at, row, lane))
     }
 
-    /// Whether two ranks overlap.
+    /// Returns whether two ranks overlap.
     pub(super) fn has(&self, ranks: [u32; 2]) -> bool {
         let place = self.place(ranks);
         place.is_some_and(|(at, row, lane)| self.hits[at][row] >> lane & 1 == 1)
     }
 
-    /// Takes the overlap of two ranks out; whether it was there.
+    /// Removes the overlap of two ranks; returns whether it was there.
     pub(super) fn take_out(&mut self, ranks: [u32; 2]) -> bool {
         let Some((at, row, lane)) = self.place(ranks) else {
             return false;
@@ -148,20 +149,20 @@ impl Met {
         was
     }
 
-    /// How many there are.
+    /// Number of overlaps.
     pub(super) fn hits(&self) -> usize {
         self.count
     }
 
-    /// How many there are, counted again.
+    /// Number of overlaps, counted again.
     pub(super) fn recount(&self) -> usize {
         let rows = self.hits.iter().flatten();
         rows.map(|row| row.count_ones() as usize).sum()
     }
 
-    /// Writes overlaps down as two body slots, and forgets them; not those of lanes that lost their body.
+    /// Saves overlaps as pairs of body slots, and removes them; those of lanes that lost their body are not saved.
     ///
-    /// * `lanes` - by block, those whose overlaps go; `None`: all do.
+    /// * `lanes` - by block, lanes whose overlaps are removed; `None`: all.
     /// * `gone` - by block, lanes that lost their body.
     /// * `slot_of` - by rank, the body slot.
     pub(super) fn carry(
@@ -226,7 +227,7 @@ impl Work for Carry<'_> {
     }
 }
 
-/// A record that differs from that of the tick before, and its blocks.
+/// A record that differs from that of the last tick, and its blocks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Change {
     was: Matrix,
@@ -234,22 +235,23 @@ struct Change {
     blocks: [usize; 2],
 }
 
-/// So many are noted before their bits are gathered: they stay in the first cache.
+/// This many are collected before their bits are gathered: they stay in the first-level cache.
 const CHANGES: usize = 64;
 
-/// Reports what is in one of two ticks alone, whose lanes are the same but for those whose body left before the second.
+/// Reports overlaps that are in only one of two ticks with the same lanes, except lanes whose body left before the
+/// second.
 ///
-/// Which of the two has a record is a guess that fails: it chooses what is read, and no branch.
+/// Which of the two ticks has a record is unpredictable: it selects what is read, without a branch.
 pub(super) struct TellDifference<'a> {
     pub(super) before: &'a Met,
     pub(super) now: &'a Met,
-    /// By block: lanes whose body has left since the one before.
+    /// By block: lanes whose body has left since `before`.
     pub(super) gone: &'a [u16],
     /// By rank: the body slot.
     pub(super) slot_of: &'a [u32],
-    /// Takes what is in the one before alone.
+    /// Receives overlaps that are only in `before`.
     pub(super) parted: &'a mut Vec<PairKey>,
-    /// Takes what is new.
+    /// Receives overlaps that are new.
     pub(super) began: &'a mut Vec<PairKey>,
 }
 
@@ -295,7 +297,7 @@ impl Work for TellDifference<'_> {
                 if gone[block] | gone[other as usize] != 0 {
                     was = without(lanes, &was, gone[block], gone[other as usize]);
                 }
-                // Field by field: a whole one would wait for its parts to be stored.
+                // Field by field: copying a whole struct would wait for its parts to be stored.
                 let change = &mut changes[len];
                 (change.was, change.is, change.blocks) = (was, is, blocks);
                 len += usize::from(was != is);
@@ -311,7 +313,7 @@ impl Work for TellDifference<'_> {
     }
 }
 
-/// Gathers what went and what came.
+/// Gathers the bits that went and those that came.
 #[inline(always)]
 fn gather<F: Fn(u32, u32) -> PairKey>(
     changes: &[Change],
@@ -319,7 +321,7 @@ fn gather<F: Fn(u32, u32) -> PairKey>(
     comes: &mut Gathered<'_, PairKey, F>,
 ) {
     for Change { was, is, blocks } in changes {
-        // Word by word: row by row each is cut out of a register and put together again.
+        // Word by word: done row by row, each row is extracted from a register and packed again.
         let (was, is) = (words(was), words(is));
         goes.put_words(std::array::from_fn(|word| was[word] & !is[word]), *blocks);
         comes.put_words(std::array::from_fn(|word| is[word] & !was[word]), *blocks);
@@ -344,7 +346,7 @@ pub(super) fn tell_asked(met: &Met, asked: &[u16], slot_of: &[u32], began: &mut 
     });
 }
 
-/// Reports what is left of each record.
+/// Reports the bits that `left` returns for each record.
 fn tell_some(
     met: &Met,
     slot_of: &[u32],
@@ -361,7 +363,7 @@ fn tell_some(
     gathered.finish();
 }
 
-/// The bits that lie neither in some rows nor in some columns.
+/// The bits that are in none of the given rows and columns.
 #[inline(always)]
 fn without<L: Lanes>(lanes: L, hits: &Matrix, rows: u16, columns: u16) -> Matrix {
     let goes = lanes.spread(rows);
@@ -372,7 +374,7 @@ fn without<L: Lanes>(lanes: L, hits: &Matrix, rows: u16, columns: u16) -> Matrix
     left
 }
 
-/// The bits of the one that are not in the other.
+/// The bits of `one` that are not in `other`.
 #[inline(always)]
 fn minus(one: &Matrix, other: &Matrix) -> Matrix {
     let mut left = [0; WIDTH];

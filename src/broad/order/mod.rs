@@ -1,30 +1,30 @@
 //! Sort-and-sweep along a space-filling order, kept across ticks: the main method.
 //!
-//! In: which bodies left, came, moved. Out: pairs of boxes that began to overlap and pairs that parted.
+//! In: bodies that left, came, moved. Out: pairs of boxes that began to overlap and pairs that parted.
 //!
-//! * **Order.** Bodies stand in blocks of sixteen, in Morton order within classes of size, largest first (`place`,
-//!   `home`). No axis is privileged, so a floor, a sheet or a tower needs no special case, and a huge body beside tiny
-//!   ones stretches no block but its own. An implicit tree stands over the blocks (`tree`).
-//! * **Fat boxes** (`fatten`): a body inside its own costs one containment test.
-//! * **Candidates** (`links`): for each two blocks that come near one another a matrix of 16 by 16 bits. They change
-//!   only where a body left its fat box (`renew`), a few blocks in each tick rather than all at once.
-//! * **The look** (`look`): candidates are compared one after the other, and begin and end are differences of bits.
-//!   Pairs whose cores overlap are sure and not compared. Cost in proportion to what moved: few moved bodies are looked
-//!   at by themselves (`moved`).
-//! * **Standing** (`stand`): where nearly all keep to their holds boxes are held against these in the order of the
-//!   world, and none is stored: a pile at rest is read once, and little is written.
-//! * **Mending** (`mend`): while bodies move, a few blocks in each tick are put in order: all are seldom sorted anew.
-//! * **Exact.** Boxes are f32, rounded outward, relative to an f64 origin amid the scene; where rounding could tell
-//!   otherwise than the f64 boxes, those are asked. So the pairs are those of the f64 boxes at any offset.
-//! * **Without candidates** (`afresh`, `sweep`, `met`, `presort`): where no fat box lasts, overlaps alone are kept; or
-//!   a list for some ticks, made by one search (`verlet`), which threads (`team`) share.
-//! * **Modes** (few or many moved; renewal, sorting anew, without candidates) are chosen by counted work with weights
-//!   measured once, so that a replay chooses alike. They decide about cost alone: pairs, slots, events are the same.
+//! * **Order.** Bodies are stored in blocks of sixteen, in Morton order within size classes, largest first (`place`,
+//!   `home`). No axis is privileged, so a floor, a sheet or a tower needs no special case, and a huge body stretches no
+//!   block of tiny ones. An implicit tree is built over the blocks (`tree`).
+//! * **Fat boxes** (`fatten`): a body that stays inside its fat box costs one containment test.
+//! * **Candidates** (`links`): a matrix of 16 by 16 bits for each two blocks near each other. They change only where a
+//!   body left its fat box (`renew`): a few blocks in each tick rather than all at once.
+//! * **The look** (`look`): candidates are compared in sequence; begin and end are differences of bits. Pairs whose
+//!   cores overlap are certain and not compared. The cost follows what moved; few moved bodies go one by one (`moved`).
+//! * **Standing** (`stand`): where nearly all bodies stay inside their fat boxes, boxes are tested against these in the
+//!   order of the world, and none is stored: a pile at rest is read once, and little is written.
+//! * **Mending** (`mend`): while bodies move, a few blocks per tick are put in order, so a sort of all is rare.
+//! * **Exact.** Boxes are f32, rounded outward, relative to an f64 origin amid the scene; where rounding could change
+//!   the answer, the f64 boxes are tested. So the pairs are those of the f64 boxes at any offset.
+//! * **Without candidates** (`afresh`, `sweep`, `met`, `presort`): where no fat box lasts, only overlaps are kept; or a
+//!   list for some ticks, made by one search (`verlet`). Threads (`team`) share the work.
+//! * **Modes** (few or many moved; renewal, sorting from scratch, without candidates) are chosen by counted work with
+//!   weights measured once, so that a replay chooses alike. They affect cost only: pairs, slots and events are the
+//!   same.
 //!
 //! Refused: three lists of sorted ends (see `sap`: exponent 1.5 to 2 as soon as motion is incoherent); a list of pairs
-//! as the one home of candidates (each renewal would insert, remove and look up single pairs; matrices are overwritten,
-//! and the list of the look is only a copy in the order of memory); a renewal of all boxes at once (cheaper by a fifth,
-//! but each eighth tick takes five times the others).
+//! as the only store of candidates (each renewal would insert, remove and look up single pairs; matrices are
+//! overwritten, and the list of the look is only a copy in memory order); renewal of all boxes at once (cheaper by a
+//! fifth, but each eighth tick takes five times as long as the others).
 //!
 //! Sources: Terdiman, "Box pruning revisited" (2017), for sorted copies in structure-of-arrays form; Verlet lists
 //! (Verlet 1967) for candidates that outlive a step; Morton 1966 for the order.
@@ -81,17 +81,17 @@ use tree::Tree;
 
 /// No index.
 const NONE: u32 = u32::MAX;
-/// One moved body in so many, and they are looked at by blocks, which takes a fraction of the time for each.
+/// When one in `MANY_MOVED` bodies moved, they are handled by blocks, which takes a fraction of the time per body.
 const MANY_MOVED: usize = 10;
-/// One body in so many that came or jumped away, and everything is sorted anew rather than each put into a free lane.
+/// When one in `MANY_CAME` bodies came or jumped, all are sorted again instead of each getting a free lane.
 const MANY_CAME: usize = 8;
 
-/// What one update is told, and where its results go.
+/// Input of one update, and where its results go.
 pub(super) struct Tick<'a, P> {
     pub(super) members: &'a Members,
     pub(super) proxies: &'a P,
     pub(super) moved: &'a [BodySlot],
-    /// Pairs whose boxes overlap: all that did not in the last tick, and any others.
+    /// Pairs whose boxes overlap: all that did not in the last tick, and possibly others.
     pub(super) began: &'a mut Vec<PairKey>,
     /// Pairs whose boxes parted.
     pub(super) parted: &'a mut Vec<PairKey>,
@@ -104,49 +104,49 @@ pub(super) struct Order {
     /// Where the f32 boxes are measured from, metres.
     origin: [f64; 3],
     tick: u32,
-    /// Ticks in which as good as all may have moved: what bodies are aged by, but for moves of their own in between.
+    /// Ticks in which nearly all bodies may have moved: the clock of their ages, except for moves of single bodies.
     beat: u32,
     /// By body slot: block and lane as one number, or `NONE`.
     rank_of: Vec<u32>,
     /// By rank: the body slot, or `NONE`.
     slot_of: Vec<u32>,
-    /// By block: lanes in use.
+    /// By block: which lanes are in use.
     live: Vec<u16>,
     /// By rank: the box, rounded outward.
     exact: Vec<Down>,
-    /// Whether boxes of bodies that keep to their holds may be those of an earlier tick (`stand`); and how many bodies
-    /// were renewed in the last tick.
+    /// Whether stored boxes of bodies inside their fat boxes may date from an earlier tick (`stand`); and how many
+    /// bodies were renewed in the last tick.
     lags: bool,
     renewed: u64,
-    /// By body slot: the fat box and the core; and by block, to be asked sixteen at a time, the fat boxes, and while
-    /// candidates are listed what is sure of the cores.
+    /// By body slot: the fat box and the core. By block, to test sixteen at a time: the fat boxes, and while candidates
+    /// are listed the certain part of the cores.
     held: Vec<Held>,
     fat: Vec<Boxes16>,
     sure: Vec<Boxes16>,
-    /// By rank: how often the lane was given a fat box or lost its body, around the clock.
+    /// By rank: how often the lane got a fat box or lost its body; wraps around.
     ages: Vec<u8>,
-    /// By rank: what the body learned of its motion.
+    /// By rank: what was learned of the body's motion.
     gaits: Vec<Gait>,
     tree: Tree,
     links: Links,
     sorter: sort::Sorter,
     /// By block: the least key that was sorted into it.
     keys: Vec<u64>,
-    /// By sixteen blocks: the part of space that the middles of each one's bodies filled when they were sorted into it;
-    /// nothing in the attic. Without candidates the bounds of their boxes when they were laid.
+    /// Per sixteen blocks, by block: the bounds of the centres of its bodies when they were sorted into it; nothing in
+    /// the attic. Without candidates, the bounds of their boxes when they were laid out.
     homes: Vec<Boxes16>,
-    /// By sixteen blocks: the part of space that their bodies filled after the last sort of all.
+    /// By sixteen blocks: the bounds of their bodies after the last sort of all.
     quarters: Vec<[f32; 6]>,
-    /// By sixteen blocks: the middle of their bodies at their last turn, or NaN.
+    /// By sixteen blocks: the centre of their bodies when they were last mended, or NaN.
     middles: Vec<[f32; 3]>,
     mender: mend::Mender,
-    /// Blocks that were sorted; those beyond take what finds no free lane.
+    /// Blocks that were sorted; those beyond take bodies that find no free lane.
     sorted: usize,
     /// Bodies in it.
     len: usize,
     /// By block: lanes that moved, while boxes are taken.
     dirty: Vec<u16>,
-    /// By block: lanes to renew in this tick; the blocks that have any; bodies without a lane that are to get one.
+    /// By block: lanes to renew in this tick; the blocks that have any; bodies that still need a lane.
     renewing: Vec<u16>,
     worklist: Vec<u32>,
     homeless: Vec<BodySlot>,
@@ -155,7 +155,7 @@ pub(super) struct Order {
     /// Pairs whose boxes overlapped when one of them lost its lane.
     carried: Vec<(u32, u32)>,
     scratch: renew::Scratch,
-    /// Boxes to be sorted, records of a body, records without candidates: memory kept over calls.
+    /// Boxes to be sorted, records of a body, records without candidates: memory kept across calls.
     boxes: Vec<[f32; 6]>,
     former: Vec<Gait>,
     touched_records: Vec<u32>,
@@ -163,15 +163,15 @@ pub(super) struct Order {
     /// The candidates as a flat list, while it is kept (`look`).
     entries: Vec<entry::Entry>,
     listed: bool,
-    /// Ticks since the last one in which many moved, as far as they count.
+    /// Ticks since the last one in which many bodies moved, up to a limit.
     still: u8,
     found: Vec<look::Found>,
     gather: moved::Gather,
-    /// Blocks met by queries since the last sort beyond what they met right after it.
+    /// Blocks met by queries since the last sort, beyond what they met right after it.
     excess: u64,
     /// Blocks met by a query right after the last sort, in sixteenths.
     usual: u64,
-    /// Lanes given up or taken in this tick, but for a sort.
+    /// Lanes given up or taken in this tick, except by a sort.
     lanes_changed: u64,
     afresh: Afresh,
 }
@@ -189,7 +189,7 @@ impl Order {
             level,
             origin: [0.0; 3],
             tick: 0,
-            // Half way round: no age comes near what stands for none.
+            // Half way round: no age comes near the value that means none.
             beat: 1 << 31,
             rank_of: Vec::new(),
             slot_of: Vec::new(),
@@ -244,7 +244,7 @@ impl Order {
         order
     }
 
-    /// Bodies with a box left (and may be about to come again). Their pairs are ended by the caller.
+    /// Bodies with a box left (and may be about to come again). The caller ends their pairs.
     pub(super) fn leave(&mut self, left: &[BodySlot]) {
         if self.afresh.on {
             self.leave_afresh(left);
@@ -323,12 +323,12 @@ impl Order {
         self.afresh.gear.note(moved, lanes, work);
     }
 
-    /// Sets whether every tick is worked without candidates, or none; `None`: as counted work says.
+    /// Sets whether every tick works without candidates, or none does; `None`: counted work decides.
     pub(super) fn use_afresh(&mut self, afresh: Option<bool>) {
         self.afresh.gear.forced = afresh;
     }
 
-    /// Reports every overlap of bodies whose pairs must be looked for, whatever moved.
+    /// Reports every overlap of bodies whose pairs must be searched, even if nothing moved.
     fn tell_asked<P: Proxies>(&mut self, tick: &mut Tick<'_, P>) {
         let members = tick.members;
         for slot in members.touched() {
@@ -344,7 +344,7 @@ impl Order {
                 |bits| bits.hit,
                 |other| {
                     let other = BodySlot(other);
-                    // Of two that are asked one tells.
+                    // If both bodies are queried, one of them reports the pair.
                     if other > *slot || !members.has(other, ASKED) || members.has(other, CAME) {
                         began.push(PairKey::new(*slot, other));
                     }
@@ -353,14 +353,14 @@ impl Order {
         }
     }
 
-    /// Forgets what was true for this tick alone.
+    /// Clears what holds for this tick only.
     fn close(&mut self) {
-        // The list names what was marked: nothing else is touched.
+        // The list names the blocks that were marked: nothing else is touched.
         for block in self.worklist.drain(..) {
             self.renewing[block as usize] = 0;
         }
         self.carried.clear();
-        // A sort may come in any tick and carries every overlap: room for that grows when their number does.
+        // A sort may come in any tick and carries every overlap: capacity for them grows with their number.
         if !is_thrifty(self.len) {
             spare(&mut self.carried, self.hits, self.len);
         }
@@ -372,7 +372,7 @@ impl Order {
         (rank != NONE).then_some(rank)
     }
 
-    /// Calls with the slot of each body that shares a bit of a matrix with the body at a rank.
+    /// Calls `with` for the slot of each body that shares a bit of a matrix with the body at `rank`.
     fn each_bit(
         &self,
         rank: u32,

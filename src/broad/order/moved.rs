@@ -1,11 +1,11 @@
-//! The look at few moved bodies: the candidates of each are looked up in the matrices.
+//! The look when few bodies moved: the candidates of each are looked up in the matrices.
 //!
 //! In: moved bodies, matrices of candidates, boxes by rank. Out: pairs that began and pairs that parted, and their
 //! bits.
 //!
-//! How: in three passes over some bodies at a time, with no branch on the boxes but for the few pairs that change.
-//! Which blocks near a body hold a candidate of it, how many each holds and whether boxes overlap cannot be guessed,
-//! and other bodies move in each tick: a branch guessed wrong takes longer than a comparison.
+//! How: in three passes over some bodies at a time, with no branch on the boxes except for the few pairs that change.
+//! Which blocks near a body hold a candidate, how many they hold and whether boxes overlap is unpredictable, and other
+//! bodies move in each tick: a mispredicted branch takes longer than a comparison.
 
 use super::bits::each_bit;
 use super::idle::{give_back, is_thrifty};
@@ -14,23 +14,23 @@ use super::look::{is_as_before, overlap, verdict};
 use super::{BodySlot, MANY_MOVED, Order, Proxies, Tick, Work as Done, parts, small};
 use crate::simd::boxes::{Down, LANES, Lanes, WIDTH, Work, prefetch};
 
-/// One moved body in so many, and candidates that are listed stay so: to list them again costs as much as some ticks,
-/// so the list is let go later than it is made.
+/// While at least one in this many bodies moved, an existing candidate list is kept: to list them again costs as much
+/// as some ticks, so the list is dropped later than it is made.
 const STILL_MANY: usize = 14;
-/// Ticks in which few moved that candidates stay listed for: to list them again costs about as much as so many looks
-/// at the list, so whichever tick comes next, at most twice the least is paid.
+/// Ticks with few moved bodies for which candidates stay listed: to list them again costs about as much as this many
+/// looks at the list, so in the worst case the cost is twice the least.
 const STILL_TICKS: u8 = 3;
-/// Moved bodies ahead whose blocks' lists are asked for, and whose matrices.
+/// Moved bodies ahead whose block lists are prefetched, and those whose matrices are.
 const AHEAD_LISTS: usize = 8;
 const AHEAD_BITS: usize = 4;
-/// Blocks with candidates that are gathered before these are compared: they stay in the first cache.
+/// Blocks with candidates that are gathered before a comparison: they stay in the first-level cache.
 const TOGETHER: usize = 64;
 
 /// Candidates of a body in a block.
 #[derive(Clone, Copy, Debug, Default)]
 struct Row {
     record: u32,
-    /// Of the body, and of the first lane of the block.
+    /// Rank of the body, and of the first lane of the block.
     rank: u32,
     first: u32,
     /// Lanes of the block: the candidates, and those of them that overlapped.
@@ -55,10 +55,10 @@ struct Found {
     now: Option<bool>,
 }
 
-/// Memory of the look, kept over ticks.
+/// Memory of the look, kept across ticks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Gather {
-    /// One more than are gathered: what follows the last is written, and read, and never kept.
+    /// One more than are gathered: the entry after the last is written and read, but never kept.
     rows: Vec<Row>,
     len: usize,
     pairs: Vec<Pair>,
@@ -67,7 +67,7 @@ pub(super) struct Gather {
 }
 
 impl Gather {
-    /// Room for a tick of so many bodies.
+    /// Reserves memory for a tick of `bodies` bodies.
     pub(super) fn reserve(&mut self, bodies: usize) {
         self.rows.resize(TOGETHER + 1, Row::default());
         room(&mut self.pairs, TOGETHER * WIDTH);
@@ -83,7 +83,7 @@ impl Gather {
         let mine = small(block);
         for (other, record) in links.of(mine) {
             let Bits { cand, hit } = links.bits(record);
-            // Rows are lanes of the lower block; within one block a pair stands in either.
+            // Rows are lanes of the lower block; within one block a pair may be in either.
             let all = |yes: bool| u16::from(yes).wrapping_neg();
             let (rows, columns) = (all(mine <= other), all(other <= mine));
             let of =
@@ -103,7 +103,7 @@ impl Gather {
         }
     }
 
-    /// Compares what is gathered, and forgets it.
+    /// Compares what is gathered, and clears it.
     #[inline(always)]
     fn compare<L: Lanes>(&mut self, lanes: L, exact: &[Down]) {
         let rows = &self.rows[..=self.len];
@@ -139,8 +139,8 @@ impl Gather {
 }
 
 impl Order {
-    /// Whether so many moved that the candidates are gone through as a list. With hysteresis, in their number and in
-    /// time: to list all candidates again costs as much as some ticks.
+    /// Returns whether so many moved that candidates are scanned as a list. With hysteresis in number and in time: to
+    /// list all candidates again costs as much as some ticks.
     pub(super) fn are_many(&mut self, moved: usize) -> bool {
         let share = if self.listed { STILL_MANY } else { MANY_MOVED };
         if moved * share > self.len {
@@ -151,11 +151,11 @@ impl Order {
         self.listed && self.still <= STILL_TICKS
     }
 
-    /// Looks at the candidates of moved bodies, one by one.
+    /// Tests the candidates of moved bodies, one by one.
     pub(super) fn look_at_moved<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
         self.give_back_list();
         let mut gather = std::mem::take(&mut self.gather);
-        // Where candidates were let go there is none; a sort makes room for what it finds.
+        // After candidates were dropped there is no memory; a sort reserves what it finds.
         gather.reserve(0);
         gather.tests = 0;
         self.level.run(LookAtMoved {
@@ -169,14 +169,14 @@ impl Order {
             let now = found
                 .now
                 .unwrap_or_else(|| overlap(&self.slot_of, found.ranks, tick.proxies));
-            // Of two bodies that both moved the pair is found twice.
+            // If both bodies moved, the pair is found twice.
             self.put_hit(found.record, [one.min(other), one.max(other)], now, tick);
         }
         give_back(&mut gather.found, self.len);
         self.gather = gather;
     }
 
-    /// Asks for what the bodies to come are looked at by: they stand far from one another.
+    /// Prefetches data of the next bodies, which are far apart in memory.
     #[inline(always)]
     fn ask_ahead(&self, moved: &[BodySlot]) {
         let rank = |ahead: usize| moved.get(ahead).and_then(|slot| self.rank(*slot));
@@ -208,7 +208,7 @@ impl Work for LookAtMoved<'_> {
             moved,
             gather,
         } = self;
-        // Out of what is behind a reference, and back: see `sweep`.
+        // Moved out of the reference, and back: see `sweep`.
         let mut kept = std::mem::take(gather);
         for at in 0..moved.len() + order.homeless.len() {
             let slot = match moved.get(at) {
@@ -231,7 +231,7 @@ mod tests {
     use crate::builtin::Random;
     use crate::simd::boxes::Level;
 
-    /// Looks at the candidates of some ranks.
+    /// Tests the candidates of some ranks.
     struct Ask<'a>(&'a Links, &'a [Down], &'a [u32], &'a mut Gather);
 
     impl Work for Ask<'_> {
@@ -249,7 +249,7 @@ mod tests {
     #[test]
     fn what_changed_is_found_in_every_block_on_every_side() {
         let mut random = Random::new(1);
-        // More blocks than are gathered at a time, half of them before that of the body.
+        // More blocks than are gathered at a time, half of them before the body's block.
         let (blocks, mine, lane) = (3 * TOGETHER, TOGETHER + TOGETHER / 2, 5);
         let rank = small(mine * WIDTH + lane);
         let mut exact = vec![Down::EMPTY; blocks * WIDTH];
@@ -259,8 +259,8 @@ mod tests {
         let (mut wanted, mut candidates) = (Vec::new(), 0);
         for block in 0..blocks {
             let mut bits = Bits::default();
-            // Candidates of others, whatever they are, in rows and lanes that are not the body's; and in each fourth
-            // block none of its own.
+            // Random candidates of other bodies, in rows and lanes that are not the body's; in each fourth block the
+            // body itself has none.
             for row in (0..WIDTH).filter(|row| *row != lane) {
                 #[allow(clippy::cast_possible_truncation, reason = "any bits will do")]
                 let others = random.bits() as u16 & !(1 << lane);
@@ -277,7 +277,7 @@ mod tests {
             {
                 let theirs = block * WIDTH + other;
                 let [now, before] = [(); 2].map(|()| random.bits().is_multiple_of(2));
-                // Some touch within what rounding leaves open.
+                // Some touch within the rounding error.
                 let open = random.bits().is_multiple_of(8);
                 let x = match (open, now) {
                     (true, _) => 1.0,

@@ -1,4 +1,4 @@
-//! The entries of a Verlet list: which are dead, and which began or ceased to overlap.
+//! The entries of a Verlet list: which are dead, and which began or ended to overlap.
 //!
 //! In: boxes by rank, lanes whose entries die. Out: pairs that began and pairs that parted.
 
@@ -9,21 +9,21 @@ use super::{BodySlot, NONE, Order, Proxies, Tick, ones};
 use crate::ids::{PairKey, small};
 use crate::simd::boxes::{Down, Lanes, WIDTH, Work, prefetch};
 
-/// Entries ahead whose boxes are asked for.
+/// Entries ahead whose boxes are prefetched.
 const AHEAD: usize = 16;
 
-/// Two bodies near one another, by rank; with [`HIT`] on the first where their boxes overlap.
+/// Two bodies near each other, by rank; [`HIT`] is set on the first if their boxes overlap.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Near {
     one: u32,
     other: u32,
 }
 
-/// The bit of [`Near::one`] that says whether the boxes overlap: no rank is that great.
+/// The bit of [`Near::one`] that says whether the boxes overlap: no rank is that large.
 const HIT: u32 = 1 << 31;
 
 impl Near {
-    /// Two ranks that have not been looked at.
+    /// Two ranks that have not been compared.
     #[inline(always)]
     pub(super) fn new(one: u32, other: u32) -> Self {
         Self { one, other }
@@ -39,14 +39,14 @@ impl Near {
         self.one & HIT != 0
     }
 
-    /// By the body slots that stand at the ranks.
+    /// The pair of body slots at the two ranks.
     #[inline(always)]
     pub(super) fn key(self, slot_of: &[u32]) -> PairKey {
         let [one, other] = self.ranks().map(|rank| BodySlot(slot_of[rank]));
         PairKey::new(one, other)
     }
 
-    /// With each of the two by what a table says of it: body slots for ranks, or ranks for body slots.
+    /// Maps both numbers by a table: ranks to body slots, or body slots to ranks.
     #[inline(always)]
     pub(super) fn by(self, table: &[u32]) -> Self {
         let [one, other] = self.ranks().map(|at| table[at]);
@@ -56,7 +56,7 @@ impl Near {
         }
     }
 
-    /// Whether either lane is among some.
+    /// Returns whether either lane is in `lanes`.
     #[inline(always)]
     pub(super) fn any_among(self, lanes: &[u16]) -> bool {
         let [one, other] = self.ranks();
@@ -64,7 +64,7 @@ impl Near {
     }
 }
 
-/// What a look at an entry found: its place in the list, and whether the boxes overlap; `None` where rounding leaves it
+/// Result of comparing an entry: its index in the list, and whether the boxes overlap; `None` where rounding leaves it
 /// open.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Found {
@@ -72,22 +72,22 @@ pub(super) struct Found {
     now: Option<bool>,
 }
 
-/// The ranks of some lanes, by block.
+/// The ranks of some lanes; `lanes` is by block.
 fn ranks(lanes: &[u16]) -> impl Iterator<Item = usize> {
     let blocks = lanes.iter().enumerate();
     blocks.flat_map(|(block, lanes)| ones(*lanes).map(move |lane| block * WIDTH + lane))
 }
 
-/// Whether the lane of a rank is among some.
+/// Returns whether the lane of a rank is in `lanes`.
 #[inline(always)]
 pub(super) fn is_among(lanes: &[u16], rank: usize) -> bool {
     lanes[rank / WIDTH] >> (rank % WIDTH) & 1 == 1
 }
 
 impl Order {
-    /// Looks at the entries from one on; tells what began and parted.
+    /// Compares the entries from `from` on; reports what began and parted.
     ///
-    /// * `old` - whether they were listed in an earlier tick: the others are told only where a body is new in its lane.
+    /// * `old` - whether they were listed in an earlier tick: new ones are reported only if a body is new in its lane.
     pub(super) fn look_listed<P: Proxies>(
         &mut self,
         from: usize,
@@ -105,7 +105,8 @@ impl Order {
         found.clear();
         let (exact, slot_of) = (&mut self.exact[..], &self.slot_of[..]);
         let (told, proxies) = (tick.parted.len(), tick.proxies);
-        // Entries that die are found by their boxes, which are nobody's for this look: no other is asked about it.
+        // Entries that die are found by their boxes, which are empty during this look, so no other entry is tested for
+        // it.
         let dying = old.then_some(&out[..]);
         debug_assert!(aside.is_empty(), "nobody's box is aside");
         for rank in ranks(dying.unwrap_or_default()) {
@@ -125,7 +126,7 @@ impl Order {
         }
         give_back(aside, self.len);
         self.hits -= lost;
-        // What is still there is found again, and told as begun, which of a pair that is stored means nothing.
+        // Pairs that still overlap are found again and reported as begun, which has no effect on stored pairs.
         let mut kept = told;
         for at in told..tick.parted.len() {
             let key = tick.parted[at];
@@ -152,7 +153,7 @@ impl Order {
         }
     }
 
-    /// Finds which of so many first entries overlap, and tells nobody.
+    /// Finds which of the first `some` entries overlap, without reporting them.
     pub(super) fn settle_listed<P: Proxies>(&mut self, some: usize, proxies: &P) {
         let verlet = &mut self.afresh.verlet;
         verlet.found.clear();
@@ -181,11 +182,11 @@ impl Order {
     }
 }
 
-/// See [`Order::settle_listed`]. Returns how many surely overlap.
+/// See [`Order::settle_listed`]. Returns how many certainly overlap.
 struct Settle<'a> {
     exact: &'a [Down],
     entries: &'a mut [Near],
-    /// What rounding leaves open.
+    /// Entries that rounding leaves open.
     found: &'a mut Vec<Found>,
 }
 
@@ -210,7 +211,7 @@ impl Work for Settle<'_> {
     }
 }
 
-/// Asks for the boxes of an entry to come: either may be of the block that the search was at.
+/// Prefetches the boxes of an entry: either may be in the block that the search was at.
 #[inline(always)]
 fn ask_ahead(exact: &[Down], entries: &[Near], at: usize) {
     if let Some(next) = entries.get(at + AHEAD) {
@@ -220,11 +221,11 @@ fn ask_ahead(exact: &[Down], entries: &[Near], at: usize) {
     }
 }
 
-/// One pass over the list: drops the dead, finds what changed. Returns how many of the dead overlapped; their pairs may
+/// One pass over the list: drops dead entries, finds changes. Returns how many of the dead overlapped; their pairs may
 /// have parted.
 struct Look<'a> {
     exact: &'a [Down],
-    /// By block: lanes whose entries die, if any may; they have no boxes.
+    /// By block: lanes whose entries die, if any; their boxes are empty.
     out: Option<&'a [u16]>,
     slot_of: &'a [u32],
     entries: &'a mut Vec<Near>,

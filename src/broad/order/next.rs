@@ -1,10 +1,11 @@
-//! The next Verlet list, made over some ticks while the one in use goes on.
+//! The next Verlet list, made over some ticks while the current one is in use.
 //!
-//! In: swept boxes that hold to the end of the next list, in their blocks. Out: that list.
+//! In: swept boxes that are valid to the end of the next list, in their blocks. Out: that list.
 //!
-//! From the tick on in which all boxes are swept anew, a run of blocks is searched in each, so that no tick has a whole
-//! search. Who leaves his new box before the list is made is late: what the search lists of him is not taken. He has
-//! left the list in use too, and was looked for among the new boxes: what is listed there of him goes over.
+//! From the tick in which all boxes are swept again, one run of blocks is searched per tick, so that no tick has a
+//! whole search. A body that leaves its new box before the list is complete is late: the new entries found for it are
+//! dropped. It left its box of the current list too, and was queried against the new boxes: its entries in the current
+//! list carry over.
 
 use super::afresh::Afresh;
 use super::idle::shed;
@@ -15,8 +16,8 @@ use crate::ids::small;
 use crate::simd::boxes::WIDTH;
 
 impl Order {
-    /// Begins the list, which is to be made in so many ticks. The first of several, in which all boxes are swept, has
-    /// no search.
+    /// Begins the list, to be made in `ticks` ticks. The first of several, in which all boxes are swept, does no
+    /// search.
     pub(super) fn open_next(&mut self, ticks: u32, work: &mut Done) {
         let blocks = self.live.len();
         let Afresh { verlet, finds, .. } = &mut self.afresh;
@@ -47,7 +48,7 @@ impl Order {
         work.tests += finds.tests;
     }
 
-    /// Takes the list into use.
+    /// Puts the new list into use.
     pub(super) fn take_over<P: Proxies>(&mut self, proxies: &P) {
         let Afresh { verlet, finds, .. } = &mut self.afresh;
         let (list, late) = (&mut finds.near, &verlet.late[..]);
@@ -61,11 +62,11 @@ impl Order {
         self.hits = kept.filter(|entry| entry.is_hit()).count();
         verlet.pace.note_list(verlet.next.sum());
         self.spare_listed();
-        // What overlaps has been told of by the list before.
+        // The old list has already reported these overlaps.
         self.settle_listed(found, proxies);
     }
 
-    /// Room for what comes up until the next list.
+    /// Reserves memory for additions until the next list.
     fn spare_listed(&mut self) {
         let blocks = self.live.len();
         let Afresh {
@@ -76,7 +77,7 @@ impl Order {
         } = &mut self.afresh;
         let entries = verlet.entries.len();
         if is_thrifty(self.len) {
-            // Until the next list is made a sort may need as much.
+            // A sort before the next list may need as much.
             shed(&mut finds.near);
         } else {
             spare(&mut verlet.entries, entries, self.len);
@@ -92,8 +93,8 @@ impl Order {
         team.reserve(blocks, self.len);
     }
 
-    /// Deals the bodies to blocks in the order that was sorted, and the list with them; whether there was a lane for
-    /// each. Where not, the list is let go, and its overlaps are remembered.
+    /// Deals the bodies to blocks in the presorted order, and remaps the list; returns whether there was a lane for
+    /// each. If not, the list is dropped, and its overlaps are saved.
     pub(super) fn lay_listed<P: Proxies>(&mut self, tick: &Tick<'_, P>) -> bool {
         let mut entries = std::mem::take(&mut self.afresh.verlet.entries);
         for entry in &mut entries {

@@ -1,72 +1,72 @@
-//! For how many ticks a Verlet list is made, when the next one is begun, and whether lists pay.
+//! How many ticks a Verlet list is made for, when the next one is begun, and whether lists pay.
 //!
-//! In: counted work and how far bodies fly, never time, so that a replay chooses alike. Out: when the list is made
-//! anew, for how long, and when it is let go.
+//! In: counted work and how far bodies fly, never time, so that a replay chooses alike. Out: when the list is rebuilt,
+//! for how long, and when it is dropped.
 
 use super::cost::{LOOK, MEET, entries_cost};
 use super::lay::LAY_TESTS;
 use super::shares::RUNS_MAX;
 
-/// Ticks that a list is in use, at first, at least and at most.
+/// Ticks that a list is in use: initial, least and most.
 const TICKS: u32 = 8;
 const TICKS_MIN: u32 = 4;
 const TICKS_MAX: u32 = 24;
-/// One in so many of them is one in which the next list is made, ... and so many at most.
+/// The next list is made during one in this many of them, and over `AHEAD_MAX` ticks at most.
 const AHEAD_SHARE: u32 = 2;
 const AHEAD_MAX: u32 = 4;
 const _: () = assert!(AHEAD_MAX as usize <= RUNS_MAX, "a run of blocks in each");
-/// After so many lists in a row that take more than a search in each tick would, there are none for a while.
+/// After this many lists in a row that cost more than a search in each tick, there are none for a while.
 const VAIN: u32 = 3;
-/// Ticks without lists when these have not paid, at first; four times as many each time that they prove no better. With
-/// fewer, more goes into lists that do not pay; with more, it is found out later that they would.
+/// Initial number of ticks without lists when these have not paid; four times as many after each further failure. With
+/// fewer, more is spent on lists that do not pay; with more, it is noticed later that they would.
 const REST_MIN: u32 = 64;
 /// Most ticks without lists before one is tried again.
 const REST_MAX: u32 = 2048;
-/// Ticks without lists after one that paid was broken off, for too much happened in one tick.
+/// Ticks without lists after a paying one was dropped because too much happened in one tick.
 const REST_BROKEN: u32 = 8;
-/// Ticks before the first: in one of them bodies are watched.
+/// Ticks before the first list: in one of them bodies are watched.
 const FIRST_REST: u32 = 2;
-/// One in so many strays, comes or jumps in a tick, and the next list is begun in the one that follows.
+/// When one in this many bodies strays, comes or jumps in a tick, the next list is begun in the following tick.
 const MANY_STRAY: usize = 32;
 
-/// What a tick is to the list in use.
+/// The role of a tick for the list in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Phase {
-    /// It lasts; the next one has not been begun.
+    /// The list lasts; the next one has not been begun.
     Lasts,
-    /// All boxes are swept anew, and the next one is begun.
+    /// All boxes are swept again, and the next list is begun.
     Opens,
-    /// The next one is being made.
+    /// The next list is being made.
     Makes,
-    /// The next one takes over.
+    /// The next list takes over.
     Ends,
 }
 
-/// What the choice is made by.
+/// State of the choice.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pace {
-    /// Ticks that a list is in use, or the next one where that is being made; and ticks until the next takes over.
+    /// Ticks that a list is in use, or the next one if that is being made; and ticks until the next takes over.
     ticks: u32,
     left: u32,
-    /// Whether the next one is being made.
+    /// Whether the next list is being made.
     making: bool,
-    /// Work of the list in use, of its last tick, and the ticks it has lasted.
+    /// Work of the list in use, of its last tick, and the number of ticks it has lasted.
     cost: u64,
     tick: u64,
     lasted: u64,
-    /// Work in a tick by the list that was judged last, in the mean, 0 where there was none; and whether the one after
-    /// it was made for more ticks, not for fewer.
+    /// Mean work per tick of the last judged list, 0 if none; and whether the list after it was made for more ticks
+    /// rather than fewer.
     before: u64,
     longer: bool,
-    /// What entries and searches may cost a tick, before a search in each costs less.
+    /// What entries and searches may cost per tick before a search in each is cheaper.
     worth: u64,
-    /// Boxes compared with a block in the first search since bodies were laid, and those beyond that since; and in the
-    /// last one.
+    /// Boxes compared with a block in the first search since the layout; the excess over that since; and the excess of
+    /// the last search.
     usual: u64,
     excess: u64,
     last: u64,
     vain: u32,
-    /// Ticks until a list is tried again, and how many there will be the next time.
+    /// Ticks until a list is tried again, and how many it will be the next time.
     rest: u32,
     spell: u32,
 }
@@ -94,7 +94,7 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Whether a list is to be begun in a tick without.
+    /// Returns whether to begin a list, in a tick without one.
     ///
     /// * `hits` - overlaps of the last tick: there will be more entries.
     /// * `worth` - what entries and searches may cost ([`list_worth`](super::cost::list_worth)).
@@ -103,7 +103,7 @@ impl Pace {
         self.rest == 0 && hits as u64 * LOOK < worth
     }
 
-    /// Whether one may be in the next tick, if none is in this.
+    /// Returns whether there may be a list in the next tick, if there is none in this.
     pub(super) fn nears(&self) -> bool {
         self.rest <= 1
     }
@@ -113,10 +113,10 @@ impl Pace {
         self.ticks
     }
 
-    /// Whether a first list would not be hopeless; where it would, it is not soon asked again.
+    /// Returns whether a first list could pay; if not, the next attempt is delayed.
     ///
     /// * `hits` - overlaps now.
-    /// * `crowding` - times more that will be near.
+    /// * `crowding` - factor by which more pairs will be near than overlap.
     /// * `worth` - as for [`Pace::begins`], by a search of all boxes as they are.
     pub(super) fn promises(&mut self, hits: usize, crowding: f64, worth: u64) -> bool {
         #[allow(clippy::cast_precision_loss, reason = "a cost")]
@@ -128,7 +128,7 @@ impl Pace {
         promises
     }
 
-    /// Lists begin, all at once.
+    /// Lists begin; the first one is made at once.
     ///
     /// * `worth` - as for [`Pace::promises`].
     pub(super) fn begin(&mut self, worth: u64) {
@@ -136,7 +136,7 @@ impl Pace {
         self.note_laid();
     }
 
-    /// What this tick is to the list in use.
+    /// The role of this tick for the list in use.
     pub(super) fn phase(&self) -> Phase {
         match (self.making, self.left) {
             (true, 0) => Phase::Ends,
@@ -151,19 +151,19 @@ impl Pace {
         (self.ticks / AHEAD_SHARE).clamp(1, AHEAD_MAX)
     }
 
-    /// Ticks in which nothing of the next list is made yet, this one among them.
+    /// Ticks, including this one, before the next list is begun.
     pub(super) fn spare(&self) -> u32 {
         self.left.saturating_sub(self.ahead())
     }
 
-    /// The next list is begun in this tick; in how many it is made, this one among them.
+    /// Begins the next list in this tick; returns in how many ticks it is made, including this one.
     pub(super) fn open(&mut self) -> u32 {
         self.making = true;
         self.left
     }
 
-    /// Ticks that a box made in this tick is swept for: to the end of the list that it is made for, the one in which
-    /// another takes over; for what has begun and parted until then is told by the old one.
+    /// Ticks that a box made in this tick is swept for: to the end of the list that it is made for, including the tick
+    /// in which the next takes over, since the old list still reports begins and ends up to then.
     ///
     /// * `first` - whether it is for the first list, which is in use from this tick on.
     pub(super) fn span(&self, first: bool) -> u32 {
@@ -174,32 +174,32 @@ impl Pace {
         }
     }
 
-    /// Whether the searches have cost more than laying anew would.
+    /// Returns whether the excess of the searches has cost more than a new layout would.
     pub(super) fn is_worn(&self, bodies: usize) -> bool {
         self.excess + self.last > u64::from(LAY_TESTS) * bodies as u64
     }
 
-    /// What entries and searches cost a tick in the mean; `None` where that is not known yet.
+    /// Mean cost per tick of entries and searches; `None` while unknown.
     pub(super) fn mean(&self) -> Option<u64> {
         (self.before > 0).then_some(self.before)
     }
 
-    /// Bodies were laid anew.
+    /// Bodies were laid out again.
     pub(super) fn note_laid(&mut self) {
         (self.usual, self.excess, self.last) = (0, 0, 0);
     }
 
-    /// Takes what the list has cost, and will have when the next one takes over; whether there is to be one.
+    /// Adds up the cost of the list until the next one takes over; returns whether there is to be a next one.
     pub(super) fn pays(&mut self) -> bool {
         let left = u64::from(self.left);
         let mean = (self.cost + left * self.tick) / (self.lasted + left).max(1);
         let pays = mean * 10 < self.worth * 9;
         if pays && self.vain == 0 && self.before > 0 {
-            // Two in a row.
+            // Two paying lists in a row.
             self.spell = REST_MIN;
         }
         self.vain = if pays { 0 } else { self.vain + 1 };
-        // Uphill: on in the direction that was better.
+        // Hill climbing: continue in the direction that was better.
         if mean > self.before {
             self.longer = !self.longer;
         }
@@ -217,7 +217,7 @@ impl Pace {
         pays
     }
 
-    /// The list is let go, and not soon tried again.
+    /// Drops the list; the next attempt is delayed.
     pub(super) fn fail(&mut self) {
         self.rest = self.spell;
         self.spell = (self.spell * 4).min(REST_MAX);
@@ -227,7 +227,7 @@ impl Pace {
         self.before = 0;
     }
 
-    /// The list is let go, for too much happened in one tick. One that had paid until then is soon tried again.
+    /// Drops the list because too much happened in one tick. If it had paid until then, the next attempt comes soon.
     pub(super) fn break_off(&mut self) {
         let paid = self.before > 0 && self.vain == 0;
         self.fail();
@@ -260,7 +260,7 @@ impl Pace {
         if hopeless {
             self.vain = VAIN - 1;
         }
-        // In the tick in which a list takes over it is the one before that bodies strayed from.
+        // In the tick in which a list takes over, bodies strayed from the one before.
         let stray = strays * MANY_STRAY > bodies && self.lasted > 1;
         if !self.making && (hopeless || stray) {
             self.left = self.left.min(self.ahead());

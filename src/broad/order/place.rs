@@ -1,4 +1,4 @@
-//! Who stands where: lanes are given up and taken, and from time to time everything is sorted anew.
+//! Assignment of bodies to lanes: lanes are given up and taken, and from time to time everything is sorted again.
 
 use super::curve::{CLASSES_MAX, Frame, SAMPLE, centre, fill, sampled};
 use super::fatten::{Gait, outward};
@@ -11,17 +11,16 @@ use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, ones, parts};
 use crate::ids::small;
 use crate::simd::boxes::{Boxes16, Down, Held, Portable, WIDTH};
 
-/// Blocks met by queries beyond what is usual that cost as much as sorting one body anew, carrying its overlaps and
-/// finding its candidates. Sorting when the excess has cost as much as a sort is at most twice as dear as the best
-/// plan.
+/// Excess blocks met by queries that cost as much as sorting one body again, carrying its overlaps and finding its
+/// candidates. Sorting when the excess has cost as much as a sort costs at most twice the best plan.
 const WORN_PER_BODY: u64 = 20;
-/// One block in so many stays empty after a sort, for bodies that find no free lane where they belong.
+/// One block in this many stays empty after a sort, for bodies that find no free lane in their region.
 pub(super) const ATTIC: usize = 16;
 
 impl Order {
     /// Takes a body's lane away.
     ///
-    /// * `carry` - whether its overlaps are remembered: it gets another lane in this tick.
+    /// * `carry` - whether its overlaps are saved: it gets another lane in this tick.
     pub(super) fn evict(&mut self, slot: BodySlot, carry: bool) {
         let Some(rank) = self.rank(slot) else { return };
         let (block, lane) = parts(rank);
@@ -34,7 +33,7 @@ impl Order {
         self.vacate_lane(rank);
     }
 
-    /// Takes the lanes of bodies away that have left, block by block: most of the cost of one is that of its block.
+    /// Takes away the lanes of bodies that left, block by block: most of the cost of a body is that of its block.
     pub(super) fn evict_all(&mut self, left: &[BodySlot]) {
         let mut ranks = std::mem::take(&mut self.worklist);
         ranks.clear();
@@ -53,7 +52,7 @@ impl Order {
         self.worklist = ranks;
     }
 
-    /// Takes some lanes of a block out of all matrices.
+    /// Removes some lanes of a block from all matrices.
     fn unlink(&mut self, block: usize, gone: u16) {
         let mut empty = std::mem::take(&mut self.emptied);
         let mut records = std::mem::take(&mut self.touched_records);
@@ -85,7 +84,7 @@ impl Order {
         self.touched_records = records;
     }
 
-    /// Leaves nobody in a lane that no matrix names any more.
+    /// Empties a lane that no matrix refers to any more.
     fn vacate_lane(&mut self, rank: u32) {
         let (block, lane) = parts(rank);
         let rank = rank as usize;
@@ -104,7 +103,7 @@ impl Order {
         self.lanes_changed += 1;
     }
 
-    /// Whether the order has cost more than sorting anew would.
+    /// Returns whether the order has cost more than sorting again would.
     pub(super) fn is_worn(&self) -> bool {
         self.excess > WORN_PER_BODY * self.len as u64
     }
@@ -116,14 +115,14 @@ impl Order {
             let Some((rank, one)) = self.lane_for(Portable, slot, tick.proxies) else {
                 return false;
             };
-            // How it got here says nothing of where it goes.
+            // How it got here does not predict where it goes.
             self.gaits[rank as usize] = Gait::NEW;
             self.seat(slot, rank, one);
         }
         true
     }
 
-    /// Gives a body a free lane, where it is to be renewed.
+    /// Gives a body a free lane and marks it for renewal.
     pub(super) fn seat(&mut self, slot: BodySlot, rank: u32, one: Down) {
         grow(&mut self.held, slot.index(), Held::EMPTY);
         self.sit(slot, rank, one);
@@ -143,7 +142,8 @@ impl Order {
         self.exact[rank as usize] = one;
     }
 
-    /// Sorts everything anew: every body, the homeless too, gets a lane and a fat box, and all candidates are found.
+    /// Sorts everything again: every body, including homeless ones, gets a lane and a fat box, and all candidates are
+    /// found.
     pub(super) fn sort_anew<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
         done.rebuilds += 1;
         self.carry_all();
@@ -176,10 +176,11 @@ impl Order {
         self.reserve(tick);
     }
 
-    /// Room for what the ticks until the next sort may need: growth belongs to a sort, not to any tick.
+    /// Reserves what the ticks until the next sort may need: memory grows in a sort, not in any tick.
     fn reserve<P>(&mut self, tick: &mut Tick<'_, P>) {
         let (bodies, blocks) = (self.len, self.live.len());
-        // As many as there can be; of many bodies as many as there are but where one is near half of the others.
+        // As many as possible at all; with many bodies, only as many as there are unless one is near half of the
+        // others.
         let most = 2 * blocks + if idle::is_thrifty(bodies) { 0 } else { bodies };
         self.links.reserve();
         let entries = self.entries.len();
@@ -202,7 +203,7 @@ impl Order {
         self.mender.reserve(blocks);
     }
 
-    /// Remembers every overlap.
+    /// Saves every overlap.
     pub(super) fn carry_all(&mut self) {
         self.carried.reserve(self.hits);
         for block in 0..small(self.live.len()) {
@@ -221,9 +222,9 @@ impl Order {
         }
     }
 
-    /// Room for the blocks of so many bodies.
+    /// Reserves the blocks of `bodies` bodies.
     pub(super) fn reserve_blocks(&mut self, bodies: usize) {
-        // How many blocks there are hangs on how many classes begin one: room for the most there can be.
+        // The number of blocks depends on how many classes begin one: reserve the most there can be.
         let most = bodies / FILL + CLASSES_MAX;
         let most = most + most / ATTIC + 1;
         for list in [&mut self.live, &mut self.dirty, &mut self.renewing] {
@@ -249,7 +250,7 @@ impl Order {
         self.scratch.reserve(most);
     }
 
-    /// Deals the sorted bodies to blocks; a class begins with a block of its own.
+    /// Deals the sorted bodies to blocks; a class begins with its own block.
     fn lay_out(&mut self, bodies: &[BodySlot], boxes: &[[f32; 6]]) {
         self.keys.clear();
         self.homes.clear();
@@ -262,7 +263,7 @@ impl Order {
         for slot in bodies {
             grow(&mut self.rank_of, slot.index(), NONE);
             let rank = self.rank_of[slot.index()] as usize;
-            // Of nobody anything is known where there were no candidates.
+            // Without candidates nothing is known about any body.
             if !self.gaits.is_empty() {
                 let gait = self.gaits.get(rank).copied();
                 self.former.push(gait.unwrap_or(Gait::NEW));
@@ -328,15 +329,15 @@ impl Order {
     }
 }
 
-/// Grows a list by body so that it has an entry for one.
+/// Grows a list by body so that it has an entry for `index`.
 pub(super) fn grow<T: Clone>(list: &mut Vec<T>, index: usize, value: T) {
     if list.len() <= index {
         list.resize(index + 1, value);
     }
 }
 
-/// Amid the boxes: as many on either side of it, on each axis. A few that are far away have no say, for what is far
-/// from here is told coarsely: by some ten millionths of how far.
+/// The median centre of the boxes on each axis. A few bodies far away do not affect it: coordinates far from it are
+/// only coarse, by some ten millionths of the distance.
 pub(super) fn middle<P: Proxies>(bodies: &[BodySlot], proxies: &P) -> [f64; 3] {
     let mut sample = [0.0; SAMPLE];
     std::array::from_fn(|k| {

@@ -1,9 +1,9 @@
-//! Without candidates: the bodies are sorted anew over some ticks while they stay in their lanes, so that no tick has
-//! all the work of laying.
+//! Without candidates: the bodies are sorted again over some ticks while they keep their lanes, so that no tick has all
+//! the work of a layout.
 //!
-//! In: the boxes of one tick. Out: some ticks later, lanes along the order that they were sorted into.
+//! In: the boxes of one tick. Out: some ticks later, lanes along that order.
 //!
-//! Who comes or jumps away in between belongs elsewhere than it was sorted to, and is seated behind the others.
+//! A body that comes or jumps away in between no longer fits the order, and gets a lane after the others.
 
 use super::afresh::FRAME_TICKS;
 use super::curve::Frame;
@@ -16,59 +16,58 @@ use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, ones, parts};
 use crate::broad::members::Members;
 use crate::simd::boxes::WIDTH;
 
-/// Ticks that the bodies are split into blocks in, at most. Measured in the gas of the bench: each then takes a third
-/// longer than others; with more ticks no less, for the first one has the boxes and the curve.
+/// Most ticks over which bodies are split into blocks. Measured in the gas scene of the bench: each of them then takes
+/// a third longer than others; more ticks do not help, for the first one has the boxes and the curve.
 pub(super) const SPLIT_TICKS_MAX: usize = 4;
-/// A sort may take one in so many of the ticks that an order lasts at its present growth: what is sorted is by so much
-/// out of date when it is laid.
+/// A sort may take one in this many of the ticks that an order lasts at its present growth: the sorted order is
+/// outdated by that much when it is used.
 const SHARE: f64 = 3.0;
 
-/// An order that is being sorted, or sorted and not laid yet.
+/// An order that is being sorted, or is sorted and not used yet.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Presort {
     on: bool,
     /// By index in the sort.
     bodies: Vec<BodySlot>,
-    /// How many are split into blocks, and how many more in each tick.
+    /// How many bodies are split into blocks, and how many more per tick.
     split: usize,
     quota: usize,
-    /// The frame of the curve that it is sorted by, where that is a new one: until it is laid, lanes are looked for by
-    /// the one before.
+    /// The curve's frame for this sort, if it is a new one: until the layout, lanes are looked up with the old one.
     frame: Option<Frame>,
-    /// Who came or jumped away since it began; and how many left.
+    /// Bodies that came or jumped away since it began; and how many left.
     late: Vec<BodySlot>,
     left: usize,
 }
 
 impl Presort {
-    /// Room for so many bodies, some of them late.
+    /// Reserves memory for `bodies` bodies and `late` late ones.
     pub(super) fn reserve(&mut self, bodies: usize, late: usize) {
         room(&mut self.bodies, bodies);
         room(&mut self.late, late);
     }
 
-    /// Gives back what it is sorted in.
+    /// Gives back the memory of the sort.
     pub(super) fn give_back(&mut self) {
         self.on = false;
         shed(&mut self.bodies);
     }
 
-    /// Lets go of it.
+    /// Drops it.
     pub(super) fn stop(&mut self) {
         self.on = false;
     }
 
-    /// Whether an order is being sorted, or sorted.
+    /// Returns whether an order is being sorted, or is sorted.
     pub(super) fn is_on(&self) -> bool {
         self.on
     }
 
-    /// Whether it is sorted.
+    /// Returns whether it is sorted.
     pub(super) fn is_ready(&self) -> bool {
         self.on && self.split == self.bodies.len()
     }
 
-    /// Notes who came or jumped away; where they are many, the order is worth nothing.
+    /// Notes bodies that came or jumped away; if they are many, the order is dropped.
     pub(super) fn note_late(&mut self, late: &[BodySlot], bodies: usize) {
         self.on &= (self.late.len() + late.len()) * MANY_CAME <= bodies;
         if self.on {
@@ -76,24 +75,24 @@ impl Presort {
         }
     }
 
-    /// Notes how many left; where they are many, their blocks would be all but empty.
+    /// Notes how many left; if they are many, the order is dropped, as its blocks would be nearly empty.
     pub(super) fn note_left(&mut self, left: usize) {
         self.left += left;
         self.on &= self.left * MANY_CAME <= self.bodies.len();
     }
 
-    /// Sorts some more.
+    /// Continues the sort.
     ///
-    /// * `boxes` - those that it began with.
+    /// * `boxes` - the boxes that it began with.
     pub(super) fn go_on(&mut self, sorter: &mut Sorter, boxes: &[[f32; 6]]) {
         self.split = sorter.split_some(boxes, self.split, self.quota);
     }
 }
 
-/// Ticks to split the bodies into blocks in; none: in the one that the sort begins in.
+/// Ticks over which to split the bodies into blocks; 0: in the tick in which the sort begins.
 ///
-/// * `most` - how much more than usual is asked before they are laid anew.
-/// * `last` - how much the last tick asked.
+/// * `most` - excess at which bodies are laid out again.
+/// * `last` - excess of the last tick.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -104,21 +103,21 @@ pub(super) fn split_ticks(most: f64, last: f64) -> usize {
 }
 
 impl Order {
-    /// Begins to sort the bodies by the boxes of this tick, which their lanes hold.
+    /// Begins to sort the bodies by the boxes of this tick, as stored in their lanes.
     ///
     /// * `ticks` - how many the sort takes after this one.
     pub(super) fn begin_presort(&mut self, ticks: usize) {
         let presort = &mut self.afresh.presort;
         presort.bodies.clear();
         self.boxes.clear();
-        // Made by the first sort of many bodies and kept: fresh pages for it are a tenth of a tick.
+        // Allocated by the first sort of many bodies and kept: fresh pages for it cost a tenth of a tick.
         room(&mut presort.bodies, self.len);
         room(&mut self.boxes, self.len);
         for (block, live) in self.live.iter().enumerate() {
             for lane in ones(*live) {
                 let slot = self.slot_of[block * WIDTH + lane];
                 presort.bodies.push(BodySlot(slot));
-                // By size, and a swept box is larger.
+                // Classes are by size, and a swept box is larger.
                 self.boxes.push(if self.afresh.verlet.on {
                     self.exact[block * WIDTH + lane].corners()
                 } else {
@@ -130,7 +129,7 @@ impl Order {
         presort.frame = None;
         if self.afresh.framed >= FRAME_TICKS {
             self.sorter.frame = Frame::of(&self.boxes);
-            // To measure from elsewhere is not done with a list.
+            // The origin is not moved while there is a list.
             if self.afresh.verlet.on && !self.sorter.frame.is_near_origin() {
                 self.afresh.verlet.adrift = true;
                 self.sorter.frame = frame;
@@ -150,8 +149,8 @@ impl Order {
         }
     }
 
-    /// Deals the bodies to blocks in the order that was sorted, by the boxes that their lanes hold, and seats who is
-    /// late; `false` where there is no lane for one.
+    /// Deals the bodies to blocks in the sorted order, by the boxes in their lanes, and gives late bodies a lane;
+    /// `false` if one finds none.
     pub(super) fn lay_presorted<P: Proxies>(&mut self, tick: &Tick<'_, P>) -> bool {
         let mut presort = std::mem::take(&mut self.afresh.presort);
         presort.stop();
@@ -162,7 +161,7 @@ impl Order {
                 self.look_from_the_middle(tick);
             }
         }
-        // Who has no lane is not dealt: who left, and who is late.
+        // A body without a lane is not dealt: those that left, and late ones.
         for slot in &presort.late {
             self.rank_of[slot.index()] = NONE;
         }
@@ -186,7 +185,7 @@ impl Order {
             self.deal_to(key, FILL, one.map(|one| (slot, one)));
         }
         let dealt = boxes.len();
-        // Their memory is back before room is made in it.
+        // Give this memory back before more is reserved in it.
         (self.sorter, self.boxes) = (sorter, boxes);
         self.afresh.presort = presort;
         self.close_blocks(dealt, tick.members.bounded().len());
@@ -197,20 +196,21 @@ impl Order {
         all
     }
 
-    /// Measures everything from the middle of the boxes: they are taken once more.
+    /// Moves the origin to the middle of the boxes: they are read once more.
     fn look_from_the_middle<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
         let now = middle(tick.members.bounded(), tick.proxies);
         let by = std::array::from_fn(|k| now[k] - self.origin[k]);
         self.sorter.frame.shift(by);
         self.origin = now;
-        // Who seems to jump by that does not: nobody asks.
+        // Bodies that seem to jump because of the new origin do not: the result is ignored.
         self.level.run(TakeLanes {
             order: self,
             proxies: tick.proxies,
         });
     }
 
-    /// Whoever has a lane is sorted, once, or late: who was neither would keep a lane in blocks that are dealt anew.
+    /// Checks that each body with a lane is sorted, once, or late: any other would keep a lane in blocks that are dealt
+    /// again.
     pub(super) fn check_presort(&self, members: &Members) -> Result<(), String> {
         let presort = &self.afresh.presort;
         if !presort.on {

@@ -1,10 +1,10 @@
-//! Without candidates: what a few bodies would do with fat boxes.
+//! Without candidates: how a few bodies would do with fat boxes.
 //!
-//! In: the boxes of some bodies, in each tick of a while. Out: how often they escape from fat boxes that nobody else
-//! sees, and what the search meets meanwhile. Where they escape no more seldom than when candidates were given up, and
-//! as much is met, candidates are not tried again: a trial takes several times what the ticks about it take, a probe
-//! next to nothing. And where most of them are at rest, all bodies are seen (`seen`), and begin with boxes as wide as
-//! theirs when candidates are tried again.
+//! In: the boxes of some bodies, in each tick for a while. Out: how often they escape from fat boxes that only the
+//! probe uses, and the density meanwhile. If escapes are no rarer than when candidates were given up, and the density
+//! is the same, candidates are not tried again: a trial costs several times as much as the ticks around it, a probe
+//! almost nothing. If most probed bodies are at rest, all bodies are observed (`seen`), and start with boxes as wide as
+//! the observed motion when candidates are tried again.
 
 use super::fatten::{Gait, HORIZON};
 use super::gear::Footing;
@@ -12,12 +12,12 @@ use super::links::room;
 use super::{BodySlot, Order, Proxies, Tick};
 use crate::simd::boxes::{Down, Held, Lanes, Portable};
 
-/// Ticks of a probe, and those of them until bodies have learned their margins, which do not count.
+/// Ticks of a probe, and how many of them are left out because bodies have yet to learn their margins.
 pub(super) const PROBE_TICKS: u32 = 64;
 const LEARN_TICKS: u32 = 16;
-/// Bodies that are watched, at most twice as many.
+/// Bodies in a probe; at most twice as many.
 const SAMPLE: usize = 64;
-/// What an overlap adds to a body's crowd: as much is near it as overlaps it, and more.
+/// What an overlap adds to the density measure: at least as many boxes are near a body as overlap it.
 const CROWD: u64 = 4;
 
 /// A body and the fat box that it would have.
@@ -28,25 +28,25 @@ struct Watched {
     held: Held,
 }
 
-/// What a probe has seen.
+/// Result of a probe so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Probe {
     ticks: u32,
-    /// Where the boxes are measured from, metres.
+    /// Origin of the boxes, metres.
     pub(super) origin: [f64; 3],
     bodies: Vec<Watched>,
-    /// Bodies that escaped from their fat boxes, and those that could have.
+    /// Number of escapes from fat boxes, and the number possible.
     escapes: u64,
     watched: u64,
-    /// Overlaps, and bodies.
+    /// Sums over the counted ticks: overlaps, and bodies.
     hits: u64,
     all: u64,
-    /// Ticks in which all bodies were seen (`seen`).
+    /// Ticks in which all bodies were observed (`seen`).
     pub(super) seen: u32,
 }
 
 impl Probe {
-    /// Begins anew, with some of these bodies.
+    /// Starts over, with some of these bodies.
     fn begin(&mut self, origin: [f64; 3], bodies: &[BodySlot]) {
         self.bodies.clear();
         room(&mut self.bodies, 2 * SAMPLE);
@@ -63,7 +63,7 @@ impl Probe {
         };
     }
 
-    /// Looks at the bodies once.
+    /// Tests the bodies once.
     fn look<P: Proxies>(&mut self, tick: &Tick<'_, P>, hits: usize) {
         self.ticks += 1;
         let counts = u64::from(self.ticks > LEARN_TICKS);
@@ -85,7 +85,7 @@ impl Probe {
         }
     }
 
-    /// What bodies at rest span, in their mean sides, where most of those that are watched are at rest.
+    /// Typical span of the motion of bodies at rest, in mean sides, if most bodies of the probe are at rest.
     pub(super) fn span(&self) -> Option<f32> {
         let mut spans = [0.0; 2 * SAMPLE];
         let mut count = 0;
@@ -101,7 +101,7 @@ impl Probe {
         (count * 2 > self.bodies.len()).then(|| spans[count / 2])
     }
 
-    /// What it comes to.
+    /// The result.
     fn footing(&self) -> Footing {
         Footing {
             escapes: self.escapes * 1024 / self.watched.max(1),
@@ -111,7 +111,7 @@ impl Probe {
 }
 
 impl Order {
-    /// Goes on with the probe of this tick, if there is one.
+    /// Continues the probe in this tick, if there is one.
     pub(super) fn probe<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
         let Some(begins) = self.afresh.gear.probes() else {
             self.forget_all_seen();

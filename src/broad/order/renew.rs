@@ -1,8 +1,8 @@
 //! New fat boxes for bodies that left theirs, and the candidates that follow.
 //!
-//! First all fat boxes of the tick are written and the tree is refitted; then each block asks once, with the box around
-//! its renewed lanes, and overwrites their rows and columns. So of two bodies that leave their boxes in one tick each
-//! sees the other's new box, and since a row is written, not added to, no pair is there twice.
+//! First all fat boxes of the tick are written and the tree is refitted; then each block queries once, with the box
+//! around its renewed lanes, and overwrites their rows and columns. So if two bodies leave their boxes in one tick,
+//! each finds the other's new box, and since rows are overwritten, no pair is there twice.
 
 mod scratch;
 
@@ -17,7 +17,7 @@ use super::{BodySlot, NONE, Order, PairKey, Proxies, Tick, Work as Done, ones, p
 use crate::simd::boxes::{Held, Lanes, WIDTH, Work, prefetch};
 
 impl Order {
-    /// Renews the lanes noted in `renewing`.
+    /// Renews the lanes marked in `renewing`.
     pub(super) fn renew<P>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
         self.worklist.sort_unstable();
         self.worklist.dedup();
@@ -32,11 +32,12 @@ impl Order {
             done,
         });
         let asked = self.worklist.len() as u64;
-        // Below the usual counts too, so that stretches of the order which always meet more are no wear.
+        // Counts below the usual are subtracted too, so that stretches of the order which always meet more do not count
+        // as wear.
         self.excess = (self.excess + met).saturating_sub(asked * self.usual / 16);
     }
 
-    /// Renews every lane, after a sort; what a query meets now is what is usual.
+    /// Renews every lane, after a sort; the blocks met by a query now become the usual number.
     pub(super) fn renew_all<P>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
         self.worklist.clear();
         for block in 0..self.live.len() {
@@ -54,9 +55,9 @@ impl Order {
         self.excess = 0;
     }
 
-    /// Gives pairs that lost their lanes while their boxes overlapped their bits back; those whose boxes do not overlap
-    /// now have parted. After it a bit that the list does not know of stands for boxes that overlap, so the look finds
-    /// it.
+    /// Restores the bits of pairs that lost their lanes while their boxes overlapped; those whose boxes do not overlap
+    /// now have parted. Afterwards a bit that the list does not know of belongs to boxes that overlap, so the look
+    /// finds it.
     pub(super) fn restore<P: Proxies>(&mut self, tick: &mut Tick<'_, P>) {
         for at in 0..self.carried.len() {
             let (one, other) = self.carried[at];
@@ -79,7 +80,7 @@ impl Order {
         }
     }
 
-    /// Reports the pairs of some bits.
+    /// Reports the pairs of the given bits as parted.
     fn tell_parted(&self, blocks: [u32; 2], gone: &Matrix, parted: &mut Vec<PairKey>) {
         let [a, b] = blocks.map(|block| block as usize * WIDTH);
         for (row, lanes) in gone.iter().enumerate() {
@@ -101,7 +102,7 @@ struct Renew<'a> {
 impl Work for Renew<'_> {
     type Out = u64;
 
-    /// Returns the blocks that all queries met.
+    /// Returns the number of blocks that all queries met.
     #[inline(always)]
     fn run<L: Lanes>(mut self, lanes: L) -> u64 {
         for at in 0..self.order.worklist.len() {
@@ -147,7 +148,7 @@ impl Renew<'_> {
         order.tree.set(block, bound);
     }
 
-    /// Overwrites the candidates of the renewed lanes of a block; returns how many blocks it met.
+    /// Overwrites the candidates of the renewed lanes of a block; returns how many blocks its query met.
     #[inline(always)]
     fn ask<L: Lanes>(&mut self, lanes: L, scratch: &mut Scratch, block: u32) -> u64 {
         let order = &mut *self.order;
@@ -180,8 +181,8 @@ impl Renew<'_> {
         met
     }
 
-    /// Of the blocks near a block those with anything near a renewed lane, or with a record to be mended. Most have
-    /// neither; no branch is taken on it here.
+    /// Selects from the blocks near a block those with anything near a renewed lane, or with a record to update. Most
+    /// have neither; there is no branch on it here.
     #[inline(always)]
     fn sift<L: Lanes>(&mut self, lanes: L, scratch: &mut Scratch, block: u32) {
         let order = &*self.order;
@@ -203,7 +204,7 @@ impl Renew<'_> {
                 NONE
             };
             *known = (scratch.stamp + 1, NONE);
-            // Both are in this tick's renewal, and the other has asked already.
+            // The other block is renewed completely in this tick, and has queried already.
             let asked = (*other < block) & (order.renewing[at] == order.live[at]);
             let close = lanes.meets(mine, order.tree.bound(at)) & renewing;
             scratch.close[kept] = Close {
@@ -252,7 +253,7 @@ impl Renew<'_> {
         self.write(lanes, block, other, record, &cand, renewing);
     }
 
-    /// The renewed lanes of a block have no candidate in another any more.
+    /// Clears the candidates of the renewed lanes of a block in another block.
     #[inline(always)]
     fn part<L: Lanes>(&mut self, lanes: L, block: u32, other: u32, record: u32, renewing: u16) {
         let mut cand = self.order.links.bits(record).cand;
@@ -264,8 +265,8 @@ impl Renew<'_> {
         self.write(lanes, block, other, record, &cand, renewing);
     }
 
-    /// Writes a matrix of candidates, and lists those of renewed lanes; what overlapped and is no candidate any more
-    /// has parted.
+    /// Writes a matrix of candidates, and lists those of renewed lanes; pairs that overlapped and are no longer
+    /// candidates have parted.
     #[inline(always)]
     fn write<L: Lanes>(
         &mut self,
@@ -289,7 +290,7 @@ impl Renew<'_> {
             };
             order.links.add(a, b, bits)
         } else {
-            // Whole matrices at a time, in and out of locals: the compiler keeps each in one wide register.
+            // Whole matrices, copied to locals and back: the compiler keeps each in one wide register.
             let bits = order.links.bits_mut(record);
             let hit = bits.hit;
             let gone = zip(&hit, cand, |hit, cand| hit & !cand);
@@ -313,7 +314,7 @@ impl Renew<'_> {
             } else if block < other {
                 clear(lanes, &mut chosen, !renewing, u16::MAX);
             } else {
-                // Of two lanes that are both renewed the lower block lists the pair.
+                // If both lanes are renewed, the lower block lists the pair.
                 let theirs = order.renewing[other as usize];
                 clear(lanes, &mut chosen, theirs, u16::MAX);
                 clear(lanes, &mut chosen, u16::MAX, !renewing);
@@ -323,7 +324,7 @@ impl Renew<'_> {
     }
 }
 
-/// Row by row.
+/// Combines two matrices row by row.
 #[inline(always)]
 fn zip(one: &Matrix, other: &Matrix, with: impl Fn(u16, u16) -> u16) -> Matrix {
     let mut out = [0; WIDTH];
@@ -333,7 +334,7 @@ fn zip(one: &Matrix, other: &Matrix, with: impl Fn(u16, u16) -> u16) -> Matrix {
     out
 }
 
-/// Clears the bits that lie in any of some rows and in any of some columns.
+/// Clears the bits that are in one of the given rows and one of the given columns.
 #[inline(always)]
 fn clear<L: Lanes>(lanes: L, matrix: &mut Matrix, rows: u16, columns: u16) {
     *matrix = zip(matrix, &lanes.spread(rows), |line, row| {
@@ -341,7 +342,7 @@ fn clear<L: Lanes>(lanes: L, matrix: &mut Matrix, rows: u16, columns: u16) {
     });
 }
 
-/// Keeps the bits that lie in any of some rows or in any of the same columns.
+/// Keeps the bits whose row or column is in `chosen`.
 #[inline(always)]
 fn keep_either<L: Lanes>(lanes: L, matrix: &mut Matrix, chosen: u16) {
     *matrix = zip(matrix, &lanes.spread(chosen), |line, row| {

@@ -1,8 +1,8 @@
-//! Where bodies at rest were seen before candidates are tried again.
+//! Where bodies at rest were observed before candidates are tried again.
 //!
-//! In: their boxes, in each tick of a probe whose bodies are at rest. Out: holds about these places, which bodies begin
-//! with: else each would have to learn its own, most in the very next tick. What is noted stands in `held`, which is
-//! not used while there are no candidates: the least of each face as the fat box, the greatest as the core.
+//! In: their boxes, in each tick of a probe whose bodies are at rest. Out: holds around these places, as initial holds;
+//! otherwise each body would have to learn its own, most in the very next tick. The observations are stored in `held`,
+//! which is unused while there are no candidates: the least of each face as the fat box, the greatest as the core.
 
 use super::fatten::{hold_of_seen, outward};
 use super::idle::{is_thrifty, shed};
@@ -10,11 +10,11 @@ use super::links::room;
 use super::{BodySlot, Order, Proxies, Tick};
 use crate::simd::boxes::{Down, Held, Hold, Lanes, Work};
 
-/// So often must bodies have been seen for it to tell where they are about.
+/// Least number of ticks observed for the result to be used.
 const LEAST: u32 = 8;
 
 impl Order {
-    /// Notes where each body is: most of those that are watched are at rest.
+    /// Observes each body in this tick: most bodies of the probe are at rest.
     pub(super) fn see_all<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
         if self.held.is_empty() {
             room(&mut self.held, self.rank_of.len());
@@ -29,14 +29,14 @@ impl Order {
         });
     }
 
-    /// Where a body was seen says nothing of who takes its slot.
+    /// Clears the observations of a slot: another body will use it.
     pub(super) fn forget_seen(&mut self, slot: BodySlot) {
         if let Some(held) = self.held.get_mut(slot.index()) {
             *held = UNSEEN;
         }
     }
 
-    /// What was seen is out of date.
+    /// Drops outdated observations.
     pub(super) fn forget_all_seen(&mut self) {
         if std::mem::take(&mut self.afresh.probe.seen) > 0 {
             self.held.clear();
@@ -46,7 +46,7 @@ impl Order {
         }
     }
 
-    /// Holds to begin with: where bodies were seen for long enough, these places; else none.
+    /// Initial holds: the observed places, if observed for long enough; otherwise none.
     pub(super) fn hold_seen(&mut self) {
         let probe = &mut self.afresh.probe;
         let ticks = std::mem::take(&mut probe.seen);
@@ -65,7 +65,7 @@ impl Order {
     }
 }
 
-/// Nothing was seen.
+/// Nothing observed.
 const UNSEEN: Held = Held::of(&Hold {
     fat: Down {
         faces: [f32::INFINITY; 8],
@@ -75,7 +75,7 @@ const UNSEEN: Held = Held::of(&Hold {
     },
 });
 
-/// Takes the least and the greatest face of each body, as a hold has them.
+/// Takes the least and the greatest position of each face, in the form of a hold.
 struct See<'a, P> {
     held: &'a mut [Held],
     origin: [f64; 3],

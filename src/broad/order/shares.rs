@@ -1,29 +1,29 @@
-//! Runs of blocks of equal work, by what the last runs took.
+//! Splits blocks into runs of equal work, based on the cost of the last runs.
 //!
-//! In: how much work each run was. Out: where the next runs end, which changes nothing but the time.
+//! In: the work of each run. Out: where the next runs end; this affects only time.
 
 use std::ops::Range;
 
 use crate::limits::THREADS_MAX;
 use crate::simd::boxes::WIDTH;
 
-/// Runs at most.
+/// Most runs.
 pub(super) const RUNS_MAX: usize = THREADS_MAX;
 
-/// The last runs, and what they took.
+/// The last runs, and their work.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Shares {
     /// Where the first run begins, and where each ends.
     start: usize,
     ends: [usize; RUNS_MAX],
     runs: usize,
-    /// By run, of those that are over.
+    /// By finished run: its work; and the number of finished runs.
     took: [u64; RUNS_MAX],
     over: usize,
 }
 
 impl Shares {
-    /// Deals blocks to so many runs; as many to each where it is not known what runs take.
+    /// Splits blocks into `runs` runs; equally if the work of runs is unknown.
     ///
     /// * `blocks` - from a multiple of `WIDTH` on.
     pub(super) fn deal(&mut self, blocks: Range<usize>, runs: usize) {
@@ -38,7 +38,7 @@ impl Shares {
         (self.runs, self.over) = (most, 0);
     }
 
-    /// How many of the blocks make so many of equal runs, if work is spread as it was.
+    /// How many of the blocks make up the first `run` of `runs` equal runs, if work is distributed as last time.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_precision_loss,
@@ -72,12 +72,12 @@ impl Shares {
         from..self.ends[at]
     }
 
-    /// How many runs are over.
+    /// Number of finished runs.
     pub(super) fn over(&self) -> usize {
         self.over
     }
 
-    /// The next run is over, and took so much.
+    /// Finishes the next run, with its work.
     pub(super) fn note(&mut self, took: u64) {
         if let Some(run) = self.took.get_mut(self.over) {
             *run = took;
@@ -85,7 +85,7 @@ impl Shares {
         }
     }
 
-    /// What the runs took that are over.
+    /// Total work of the finished runs.
     pub(super) fn sum(&self) -> u64 {
         self.took[..self.over].iter().sum()
     }
@@ -104,15 +104,15 @@ mod tests {
         let mut shares = Shares::default();
         shares.deal(320..960, 4);
         assert_eq!(ends(&shares), [480, 640, 800, 960]);
-        // All of it in the first run, but for as much in the second half.
+        // All of it in the first run, except as much in the second half.
         for took in [500, 0, 250, 250] {
             shares.note(took);
         }
         assert_eq!(shares.sum(), 1000);
-        // Twice as many blocks, from elsewhere.
+        // Twice as many blocks, from another start.
         shares.deal(0..1280, 4);
         assert_eq!(ends(&shares), [160, 320, 960, 1280]);
-        // Runs that were not brought to an end tell nothing.
+        // Unfinished runs are ignored.
         shares.note(1);
         shares.deal(0..1280, 2);
         assert_eq!(ends(&shares), [640, 1280]);

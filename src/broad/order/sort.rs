@@ -1,22 +1,22 @@
-//! The sort: bodies along the curve, and split into blocks.
+//! The sort: puts bodies along the curve, and splits them into blocks.
 
 use super::curve::{CLASSES_MAX, CURVE_BITS, Cells, Frame, centre};
 use super::idle::shed;
 use crate::simd::boxes::WIDTH;
 
-/// Bits of a body's index in the sorted words: `limits::BODIES_MAX` and some.
+/// Bits of a body's index in the sorted words: `limits::BODIES_MAX` and more.
 const INDEX_BITS: u32 = 28;
-/// Bits that one pass of the radix sort takes.
+/// Bits per pass of the radix sort.
 const DIGIT_BITS: u32 = 11;
 const _: () = assert!(CLASSES_MAX.ilog2() + CURVE_BITS + INDEX_BITS <= u64::BITS);
-/// Times that cells are made finer where bodies crowd in one: from any two to the finest.
+/// How often cells are refined where bodies crowd in one: enough from any two to the finest.
 const FINER: u32 = 8;
 
 /// A frame of the curve and the memory of the sort.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sorter {
     pub(super) frame: Frame,
-    /// A key above an index each.
+    /// A key in the upper bits, an index in the lower ones.
     words: Vec<u64>,
     spare: Vec<u64>,
     counts: Vec<u32>,
@@ -68,8 +68,8 @@ impl Sorter {
         }
     }
 
-    /// The rest, some of it: splits the bodies from one on, as many as asked for and what completes a stretch, into
-    /// blocks. Returns where it ended.
+    /// A portion of the second part of [`Sorter::sort`]: splits bodies from `from` on into blocks, `some` of them and
+    /// the rest of a stretch. Returns where it ended.
     pub(super) fn split_some(&mut self, boxes: &[[f32; 6]], mut from: usize, some: usize) -> usize {
         let to = (from + some).min(self.words.len());
         while from < to {
@@ -92,12 +92,12 @@ impl Sorter {
         from
     }
 
-    /// What the sort has yielded: of [`Sorter::begin`] as far as it is split.
+    /// The result of the sort: that of [`Sorter::begin`], as far as it is split.
     pub(super) fn sorted(&self) -> impl Iterator<Item = (u64, u32)> + Clone + '_ {
         self.words.iter().map(|word| unpacked(*word))
     }
 
-    /// One pass, stable.
+    /// One stable pass of the radix sort.
     fn pass(&mut self, shift: u32) {
         let digits = 1_usize << DIGIT_BITS;
         let digit = |word: u64| usize::try_from(word >> shift).unwrap_or(0) & (digits - 1);
@@ -121,17 +121,17 @@ impl Sorter {
     }
 }
 
-/// Puts those that share a cell, where they are more than a stretch, in the order of finer cells: a scene of two groups
-/// far from each other would have two cells.
+/// Sorts bodies that share a cell by finer cells, if they are more than a stretch: a scene of two groups far from each
+/// other would otherwise have two cells.
 ///
 /// * `words` - sorted by their keys, which stay.
-/// * `finest` - cells a metre, at most.
+/// * `finest` - most cells per metre.
 fn refine(words: &mut [u64], boxes: &[[f32; 6]], finest: f64, deeper: u32) {
     let Some(deeper) = deeper.checked_sub(1) else {
         return;
     };
     let mut from = 0;
-    // Whoever are more than a stretch hold two places that are half a stretch apart.
+    // More bodies than a stretch with one key cover two positions that are half a stretch apart.
     while let Some(ahead) = words.get(from + STRETCH / 2) {
         let (key, _) = unpacked(words[from]);
         if unpacked(*ahead).0 != key {
@@ -172,16 +172,16 @@ fn unpacked(word: u64) -> (u64, u32) {
     (word >> INDEX_BITS, u32::try_from(index).unwrap_or(0))
 }
 
-/// Bodies put in a block by a sort: one lane stays free for who comes later.
+/// Bodies that a sort puts in a block: one lane stays free for bodies that come later.
 pub(super) const FILL: usize = WIDTH - 1;
 
-/// Bodies that are split into blocks together: as many blocks as a node of the tree has children.
+/// Bodies that are split into blocks together: as many blocks as a tree node has children.
 const STRETCH: usize = FILL * WIDTH;
 
-/// Orders a stretch so that each block of it is compact: halves by the middle along the longest axis, and so on. The
-/// curve alone gives blocks that meet twice as many others.
+/// Orders a stretch so that each of its blocks is compact: recursively halves it at the median along the longest axis.
+/// The curve alone gives blocks that meet twice as many others.
 ///
-/// * `fill` - bodies of a block.
+/// * `fill` - bodies per block.
 pub(super) fn split(middles: &mut [([f32; 3], u32)], fill: usize) {
     if middles.len() <= fill {
         return;
@@ -256,7 +256,7 @@ mod tests {
             ..Sorter::default()
         };
         let order: Vec<u32> = sorter.along_curve(&boxes).map(|(_, index)| index).collect();
-        // Sixteen in a row stand in a square of four by four, or nearly so.
+        // Sixteen in a row form a square of four by four, or nearly so.
         let spread = |k: usize| {
             let blocks = order.chunks_exact(16).map(|block| {
                 let at = block.iter().map(|index| boxes[*index as usize][k]);

@@ -1,11 +1,11 @@
-//! The load where nearly all bodies keep to their holds: boxes are held against these in the order of the world.
+//! The load when nearly all bodies stay in their holds: boxes are tested against these in the order of the world.
 //!
-//! In: which bodies moved, their boxes, their holds. Out: who has left his hold.
+//! In: which bodies moved, their boxes, their holds. Out: which bodies left their hold.
 //!
-//! A body that keeps to its hold tells nothing new but to candidates that are not sure, and in a pile at rest few are
-//! not: these ask the world itself (`look`). So no box is stored, and what is read stands one after the other, while
-//! block by block each box of the world and its place among those stored is somewhere else, and a tick waits for memory
-//! alone. Where a stored box is read, that of its body is taken before.
+//! A body inside its hold matters only to candidates that are not certain, and a pile at rest has few of these: they
+//! read the world itself (`look`). So no box is stored, and memory is read in sequence. Block by block, in contrast,
+//! each box of the world and its place among the stored ones is somewhere else, and a tick only waits for memory.
+//! Before a stored box is read, it is updated from the world.
 
 use std::ops::Range;
 
@@ -14,31 +14,31 @@ use super::load::Taking;
 use super::{BodySlot, Order, Proxies, Tick, ones, parts};
 use crate::simd::boxes::{Lanes, WIDTH, Work};
 
-/// Boxes begin to be held against holds alone where no more than one body in so many was renewed in the last tick.
+/// This mode begins when no more than one body in this many was renewed in the last tick.
 const CALM: u64 = 64;
-/// Boxes go on to be held against holds alone where no more than one body in so many was renewed in the last tick: to
-/// take all boxes again costs as much as some ticks.
+/// This mode continues while no more than one body in this many was renewed in the last tick: taking all boxes again
+/// costs as much as some ticks.
 const STILL_CALM: u64 = 2 * HORIZON as u64;
 
 impl Order {
-    /// Whether boxes are to be taken so.
+    /// Returns whether this mode is used.
     ///
     /// * `many` - whether many moved.
     pub(super) fn stands(&self, many: bool) -> bool {
         let calm = if self.lags { STILL_CALM } else { CALM };
-        // A candidate that is not sure costs as much as a body: two boxes that stand anywhere.
+        // An uncertain candidate costs as much as a body: two boxes at random places in memory.
         let few_open = self.entries.len() < self.len;
         many && self.listed && few_open && self.renewed * calm <= self.len as u64
     }
 
-    /// Finds who has left his hold, and notes whom to renew; see [`Order::load`].
+    /// Finds bodies that left their hold, and marks them for renewal; see [`Order::load`].
     pub(super) fn load_standing<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
         self.lags = true;
         let level = self.level;
         level.run(LoadStanding { order: self, tick });
     }
 
-    /// They do not stand: all boxes are stored again.
+    /// Ends this mode: all boxes are stored again.
     pub(super) fn stir<P: Proxies>(&mut self, proxies: &P) {
         if self.lags {
             self.catch_up(0..self.live.len(), proxies);
@@ -46,7 +46,7 @@ impl Order {
         }
     }
 
-    /// Takes the boxes of some blocks, where those stored lag.
+    /// Updates the stored boxes of some blocks, if they lag.
     pub(super) fn catch_up<P: Proxies>(&mut self, blocks: Range<usize>, proxies: &P) {
         if self.lags {
             let level = self.level;
@@ -58,7 +58,7 @@ impl Order {
         }
     }
 
-    /// Takes the boxes of a block.
+    /// Updates the stored boxes of a block.
     #[inline(always)]
     fn catch_up_block<L: Lanes, P: Proxies>(&mut self, lanes: L, block: usize, proxies: &P) {
         let taking = Taking::of(&self.slot_of, block);
@@ -84,7 +84,7 @@ impl<P: Proxies> Work for LoadStanding<'_, '_, P> {
         let (order, tick) = (self.order, self.tick);
         let origin = order.origin;
         for slot in tick.moved {
-            // Who has no lane has no hold.
+            // A body without a lane has no hold.
             let Some(held) = order.held.get(slot.index()) else {
                 continue;
             };
@@ -94,7 +94,7 @@ impl<P: Proxies> Work for LoadStanding<'_, '_, P> {
                 continue;
             }
             if let Some(rank) = order.rank(*slot) {
-                // Far from the origin rounding is more than the core leaves.
+                // Far from the origin the rounding error exceeds the core's reserve.
                 if !order.take(lanes, tick.proxies, *slot, rank as usize) {
                     let (block, lane) = parts(rank);
                     order.mark(block, 1 << lane);

@@ -1,11 +1,11 @@
 //! The search for overlaps among all boxes, block by block.
 //!
-//! In: boxes in their lanes, the tree over the blocks. Out: a matrix of bits for each two blocks with any overlap
-//! (`met`), and the pairs that rounding leaves open.
+//! In: boxes in their lanes, the tree over the blocks. Out: a bit matrix for each two blocks with any overlap (`met`),
+//! and the pairs that rounding leaves open.
 //!
 //! How: a block within itself, and then four passes over the others near it, each a loop without a branch that depends
-//! on the boxes. Which lanes come near which block, how many they are and what they meet cannot be guessed: with a loop
-//! a pair of blocks, a branch guessed wrong took longer than the comparisons.
+//! on the boxes. Which lanes come near which block, how many there are and what they meet is unpredictable: with one
+//! loop per pair of blocks, mispredicted branches took longer than the comparisons.
 
 use crate::ids::small;
 use std::ops::Range;
@@ -18,21 +18,21 @@ use super::near::Near;
 use super::tree::{Tree, Walk};
 use crate::simd::boxes::{Boxes16, LANES, Lanes, WIDTH, Work, prefetch, slack};
 
-/// Blocks near one that are worked on together: what the passes hand on stays in the first cache.
+/// Nearby blocks that are processed together: what the passes hand on stays in the first-level cache.
 const TOGETHER: usize = 64;
-/// Sides whose lanes make a word.
+/// Sides whose lanes fit in a word.
 const SIDES: usize = u64::BITS as usize / WIDTH;
-/// Blocks ahead whose boxes are asked for.
+/// Blocks ahead whose boxes are prefetched.
 const AHEAD: usize = 2;
 
-/// A block of which some lanes are to be compared with the boxes of another, or of itself.
+/// A block with some lanes to compare with the boxes of another block, or of itself.
 #[derive(Clone, Copy, Debug, Default)]
 struct Side {
     block: u32,
     against: u32,
 }
 
-/// What a box met: the place of its side, its lane, and lanes of the other block.
+/// Result for a box: the index of its side, its lane, and the lanes of the other block that it met.
 #[derive(Clone, Copy, Debug, Default)]
 struct Hit {
     side: u16,
@@ -40,7 +40,7 @@ struct Hit {
     met: u16,
 }
 
-/// What the passes over some near blocks have come to.
+/// Totals of the passes over some near blocks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Count {
     sides: usize,
@@ -49,7 +49,7 @@ struct Count {
     hits: usize,
 }
 
-/// Where the boxes stand: what a search reads.
+/// Input of a search: where the boxes are stored.
 #[derive(Clone, Copy)]
 pub(super) struct Field<'a> {
     /// By block: lanes in use.
@@ -62,11 +62,11 @@ pub(super) struct Field<'a> {
 /// What a search found, and its memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Finds {
-    /// The overlaps, of the searched blocks alone.
+    /// The overlaps, of the searched blocks only.
     pub(super) met: Met,
-    /// Ranks of boxes for which rounding leaves it open.
+    /// Ranks of boxes whose overlap rounding leaves open.
     pub(super) open: Vec<[u32; 2]>,
-    /// What is near, where that alone is asked for.
+    /// The near pairs, if only these are searched.
     pub(super) near: Vec<Near>,
     /// How many boxes were compared with a block.
     pub(super) tests: u64,
@@ -74,20 +74,20 @@ pub(super) struct Finds {
 }
 
 impl Finds {
-    /// Room for a search among so many blocks and bodies.
+    /// Reserves memory for a search among that many blocks and bodies.
     pub(super) fn reserve(&mut self, blocks: usize, bodies: usize) {
         self.scratch.reserve(blocks);
         room(&mut self.open, bodies);
     }
 
-    /// Gives the memory of what was found back.
+    /// Gives back the memory of the results.
     pub(super) fn give_back(&mut self) {
         self.met.give_back();
         shed(&mut self.open);
         shed(&mut self.near);
     }
 
-    /// Room for more than it holds.
+    /// Reserves room for more than it holds.
     pub(super) fn spare(&mut self) {
         let (records, blocks) = (self.met.len(), self.met.blocks());
         self.met.spare_for(records, blocks);
@@ -95,7 +95,7 @@ impl Finds {
         spare(&mut self.near, near, blocks);
     }
 
-    /// Puts what was found among the blocks that follow behind.
+    /// Appends the results of the following blocks.
     pub(super) fn append(&mut self, next: &Self) {
         self.met.append(&next.met);
         self.open.extend_from_slice(&next.open);
@@ -104,16 +104,16 @@ impl Finds {
     }
 }
 
-/// What the passes hand on, kept over calls.
+/// Data passed between the passes, kept across calls.
 #[derive(Clone, Debug)]
 struct Scratch {
     walk: Walk,
     /// Blocks near one.
     near: Vec<u32>,
     sides: [Side; TOGETHER],
-    /// By side: lanes to compare. A word more than there can be: some are read together.
+    /// By side: lanes to compare. With one extra word, since several are read together.
     lanes: [u16; TOGETHER + SIDES],
-    /// As long as the most there can be, and one more.
+    /// As long as the most hits possible, plus one.
     hits: Vec<Hit>,
     matrices: [Matrix; TOGETHER],
 }
@@ -132,7 +132,7 @@ impl Default for Scratch {
 }
 
 impl Scratch {
-    /// Room for a block that is near every other.
+    /// Reserves memory for a block that is near every other.
     fn reserve(&mut self, blocks: usize) {
         self.walk.reserve(blocks);
         room(&mut self.near, blocks + WIDTH);
@@ -143,13 +143,13 @@ impl Scratch {
 /// What is searched for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Search {
-    /// Overlaps, as matrices, and what rounding leaves open.
+    /// Overlaps, as matrices, and pairs that rounding leaves open.
     Overlaps,
-    /// What is near, behind what is listed already.
+    /// Near pairs, appended to those already listed.
     Near,
 }
 
-/// Searches some blocks and every block behind them.
+/// Searches some blocks against themselves and every later block.
 pub(super) struct Sweep<'a> {
     pub(super) field: Field<'a>,
     /// From a multiple of `WIDTH` on.
@@ -164,7 +164,7 @@ impl Work for Sweep<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) {
         let (field, finds) = (self.field, self.finds);
-        // Out of what is behind a reference, and back: the compiler keeps the ends of the lists in registers.
+        // Moved out of the reference, and back: the compiler then keeps the lists' ends in registers.
         let mut scratch = std::mem::take(&mut finds.scratch);
         let mut open = std::mem::take(&mut finds.open);
         let mut met = std::mem::take(&mut finds.met);
@@ -188,7 +188,7 @@ impl Work for Sweep<'_> {
             for some in near.chunks(TOGETHER) {
                 let mut count = Count::default();
                 let others = match some {
-                    // It is near itself, and the first that is.
+                    // A block is near itself, and comes first.
                     [first, others @ ..] if *first == small(block) => {
                         scratch.within(lanes, field, block, &mut count);
                         others
@@ -221,17 +221,17 @@ impl Work for Sweep<'_> {
 impl Scratch {
     /// Compares the boxes of a block with one another: each pair once.
     ///
-    /// All lanes, in use or not: which are is a guess that fails.
+    /// All lanes, in use or not: which ones are is unpredictable.
     #[inline(always)]
     fn within<L: Lanes>(&mut self, lanes: L, field: Field<'_>, block: usize, count: &mut Count) {
         let boxes = &field.fat[block];
-        // A copy of its own, which no list can change: it stays in registers.
+        // A local copy, which no list can alias: it stays in registers.
         let (mine, against) = (*boxes, small(block));
         self.sides[0] = Side {
             block: against,
             against,
         };
-        // None is left to be compared.
+        // No lane is left to compare.
         self.lanes[0] = 0;
         for lane in 0..LANES {
             let behind = (u16::MAX << lane) << 1;
@@ -249,8 +249,8 @@ impl Scratch {
         count.boxes = field.live[block].count_ones() as usize;
     }
 
-    /// Of two blocks whose bounds meet, the fewer of the lanes that meet the other's bound; nothing where either has
-    /// none.
+    /// For two blocks whose bounds meet: of the lanes of either that meet the other's bound, takes the smaller set;
+    /// nothing if either set is empty.
     #[inline(always)]
     fn sift<L: Lanes>(
         &mut self,
@@ -297,7 +297,7 @@ impl Scratch {
     fn compare<L: Lanes>(&mut self, lanes: L, field: Field<'_>, count: &mut Count) {
         let mut kept = count.hits;
         for first in (0..count.sides).step_by(SIDES) {
-            // How many lanes a side has is a guess that fails: it is made once for some.
+            // The number of lanes of a side is unpredictable: one loop runs over several sides.
             let some = self.lanes[first..first + SIDES].iter().rev();
             let mut left = some.fold(0, |left, lanes| left << WIDTH | u64::from(*lanes));
             while left != 0 {
@@ -305,7 +305,7 @@ impl Scratch {
                 left &= left - 1;
                 let (at, lane) = (first + bit / WIDTH, bit % WIDTH);
                 let side = &self.sides[at % TOGETHER];
-                // Both are at hand before a lane is read: it then goes from memory to all lanes in one step.
+                // Both references are loaded before a lane is read: it then goes from memory to all lanes in one step.
                 let (block, against) = (
                     &field.fat[side.block as usize],
                     &field.fat[side.against as usize],
@@ -324,7 +324,7 @@ impl Scratch {
         count.hits = kept;
     }
 
-    /// Enters what was met into the matrices; what is not sure is noted as open. Returns how many pairs met.
+    /// Enters the hits into the matrices; uncertain ones are listed as open. Returns how many pairs met.
     #[inline(always)]
     fn enter<L: Lanes>(
         &mut self,
@@ -336,15 +336,15 @@ impl Scratch {
     ) -> usize {
         let mut pairs = 0;
         self.matrices[..sides].fill(EMPTY);
-        // What meets a box drawn in by the slack of either surely overlaps it, as `Lanes::parts` tells: a face of the
-        // other that is farther out than the slack is made for is passed by more than it was rounded by.
+        // A box that meets another shrunk by the slack of either certainly overlaps it, see `Lanes::parts`: a face of
+        // the other that is farther out than the slack allows for is passed by more than its rounding error.
         let by = slack(farthest(field.tree.bound(block)));
         for hit in &self.hits[..hits] {
             let side = &self.sides[usize::from(hit.side)];
             let (one, other) = (side.block as usize, side.against as usize);
             let lane = 1 << hit.lane;
             pairs += hit.met.count_ones() as usize;
-            // Rows are lanes of the block at hand.
+            // Rows are lanes of the current block.
             let (rows, columns) = if one == block {
                 (lane, hit.met)
             } else {
@@ -366,7 +366,7 @@ impl Scratch {
         pairs
     }
 
-    /// Lists what was met.
+    /// Lists the hits as near pairs.
     #[inline(always)]
     fn list(&self, Count { hits, .. }: Count, listed: &mut Vec<Near>) {
         let pairs = self.hits[..hits].iter().map(|hit| hit.met.count_ones());
@@ -383,12 +383,12 @@ impl Scratch {
     #[inline(always)]
     fn record(&self, block: usize, Count { sides, .. }: Count, met: &mut Met) {
         let sides = self.sides[..sides].iter().zip(&self.matrices);
-        // The other of the two, or itself.
+        // The other of the two blocks, or the block itself.
         met.push_all(sides.map(|(side, hits)| (side.block ^ side.against ^ small(block), hits)));
     }
 }
 
-/// How far the farthest face of a bound is from the origin: at least as far as that of any box in it.
+/// Distance of the farthest face of a bound from the origin: at least that of any box in it.
 #[inline(always)]
 fn farthest(bound: &[f32; 6]) -> f32 {
     let mut largest = 0.0_f32;

@@ -1,6 +1,6 @@
-//! Boxes for some ticks: where a body will have been if it goes on as it came, or wanders (`course`).
+//! Boxes for several ticks: where a body will have been if it keeps its course, or wanders (`course`).
 //!
-//! In: the boxes of this tick and the last. Out: swept boxes, by rank and in the blocks; and who has left his.
+//! In: the boxes of this tick and the last. Out: swept boxes, by rank and in the blocks; and bodies that left theirs.
 
 use super::course::{Reach, SAMPLE};
 use super::fatten::outward;
@@ -12,7 +12,7 @@ use crate::ids::small;
 use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work};
 
 impl Order {
-    /// Notes where the bodies are, so that the boxes of this tick tell how they move.
+    /// Saves the places of the bodies, so that the boxes of this tick show how they move.
     fn note_places(&mut self) {
         for (block, live) in self.live.iter().enumerate() {
             for lane in ones(*live) {
@@ -21,7 +21,7 @@ impl Order {
         }
     }
 
-    /// Notes where all are where a list is to be begun in this tick, and where some are if it may be in the next.
+    /// Saves the places of all bodies if a list begins in this tick, and of some if one may begin in the next.
     pub(super) fn prepare_list(&mut self, begins: bool) {
         if begins {
             self.note_places();
@@ -30,7 +30,7 @@ impl Order {
         }
     }
 
-    /// Notes where some are, two ticks before a list is begun.
+    /// Saves the places of some bodies, two ticks before a list begins.
     fn watch_places(&mut self) {
         let course = &mut self.afresh.verlet.course;
         course.clear();
@@ -39,10 +39,10 @@ impl Order {
         }
     }
 
-    /// Finds whether they go on as they came, once the places noted are those of the last tick and the blocks hold this
-    /// one's.
+    /// Measures whether bodies keep their course; the saved places must be those of the last tick, and the blocks must
+    /// hold this tick's boxes.
     ///
-    /// * `kept` - whether they have their lanes still.
+    /// * `kept` - whether they still have the same lanes.
     pub(super) fn ask_course(&mut self, kept: bool) {
         let course = &mut self.afresh.verlet.course;
         for block in (0..self.live.len()).step_by(SAMPLE).filter(|_| kept) {
@@ -53,9 +53,9 @@ impl Order {
         course.close();
     }
 
-    /// How many times more pairs will be near than overlap, if boxes are swept for some ticks: by how much the boxes
-    /// grow, in the mean over some blocks. To be asked once the places noted are those of the last tick and the blocks
-    /// hold this one's.
+    /// Factor by which more pairs will be near than overlap if boxes are swept for `ticks` ticks, estimated from the
+    /// mean growth of the boxes of some blocks. The saved places must be those of the last tick, and the blocks must
+    /// hold this tick's boxes.
     pub(super) fn crowding(&self, ticks: u32) -> f64 {
         let (mut sum, mut count) = (0.0, 0_u32);
         let reach = self.afresh.verlet.course.reach(ticks);
@@ -74,8 +74,8 @@ impl Order {
         sum / f64::from(count.max(1))
     }
 
-    /// Takes every box; sweeps all anew where the next list is begun, else those that stray. Notes who does, and who
-    /// has jumped clear of where its block was: how many.
+    /// Takes every box; sweeps all again if the next list begins, otherwise those of strays. Lists strays and bodies
+    /// that jumped out of their block's bound; returns the number of the latter.
     ///
     /// * `span` - ticks to sweep for.
     pub(super) fn take_swept<P: Proxies>(&mut self, proxies: &P, phase: Phase, span: u32) -> usize {
@@ -101,7 +101,7 @@ impl Order {
         jumps
     }
 
-    /// Takes every box where it was laid; its swept box stands there.
+    /// Takes every box in its new lane; the block there holds its swept box.
     pub(super) fn take_laid<P: Proxies>(&mut self, proxies: &P) {
         let level = self.level;
         level.run(TakeLaid {
@@ -111,7 +111,7 @@ impl Order {
     }
 }
 
-/// What a box holds, cubic metres.
+/// Volume of a box, cubic metres.
 fn volume(one: &Down) -> f32 {
     let [x, y, z, u, v, w] = one.corners();
     (u - x) * (v - y) * (w - z)
@@ -177,7 +177,8 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
             let (mut late, mut jumped) = (0, 0);
             for lane in ones(out) {
                 if !opens {
-                    // The boxes of the next list stand in the blocks: who has left that of the old one alone keeps his.
+                    // The blocks hold the boxes of the next list: a body that has left only its old box keeps its new
+                    // one.
                     let next = Down::of(fat.get(lane)).open();
                     let keeps = makes && lanes.holds(&next, &exact[lane]);
                     swept[lane] = if keeps {
@@ -191,7 +192,7 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
                     let rank = small(block * WIDTH + lane);
                     strays.push(rank);
                 } else {
-                    // He gets another lane, and is new there.
+                    // It gets another lane, and is new there.
                     jumped |= 1 << lane;
                 }
             }
@@ -212,7 +213,8 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
     }
 }
 
-/// Sweeps the boxes of some lanes anew, into their block; who has left the old one is held to the new alone.
+/// Sweeps the boxes of some lanes again, into their block; a body that left its old box is tested against the new one
+/// only.
 #[inline(always)]
 fn sweep_anew(
     reach: &Reach,
@@ -223,7 +225,7 @@ fn sweep_anew(
     for lane in ones(lanes) {
         let wide = reach.sweep(&before[lane], &now[lane]).open();
         fat.set(lane, &wide.corners());
-        // Whoever leaves either has left.
+        // A body that leaves either box counts as having left.
         swept[lane] = if out >> lane & 1 == 1 {
             wide
         } else {
@@ -232,14 +234,14 @@ fn sweep_anew(
     }
 }
 
-/// The boxes of a block, as single ones.
+/// The boxes of a block, one by one.
 fn boxes_of(block: &Boxes16) -> [Down; WIDTH] {
     std::array::from_fn(|lane| Down::of(block.get(lane)))
 }
 
 /// Takes the boxes of a block; returns the lanes whose box has left its swept one.
 ///
-/// * `before` - takes the former boxes of those lanes, and with `all` of every one; what nobody asks for is not read.
+/// * `before` - receives the former boxes of those lanes, or with `all` of every lane; unused ones are not read.
 #[inline(always)]
 fn take<L: Lanes, P: Proxies>(
     lanes: L,
@@ -262,7 +264,7 @@ fn take<L: Lanes, P: Proxies>(
     out
 }
 
-/// What lies within both boxes.
+/// The intersection of two boxes.
 #[inline(always)]
 fn within(one: &Down, other: &Down) -> Down {
     let mut both = *one;
@@ -299,7 +301,7 @@ impl<P: Proxies> Work for TakeLaid<'_, P> {
     }
 }
 
-/// Whether a box meets a bound.
+/// Returns whether a box meets a bound.
 #[inline(always)]
 fn meets(one: &Down, bound: &[f32; 6]) -> bool {
     let one = one.corners();

@@ -1,14 +1,14 @@
-//! Threads that search beside the tick's own, where the work is worth it.
+//! Threads that search in parallel with the tick's own, where the work is worth it.
 //!
 //! In: boxes in their lanes, the tree over the blocks. Out: the overlaps in the order of blocks, the same bits for any
 //! number of threads.
 //!
-//! How: each thread searches a run of blocks, and the runs' overlaps are put one behind the other. The runs are of
-//! equal work by what the last tick's runs took; where they end changes nothing but the time. What is read is lent to
-//! the others by moving it into a shared place for the while (three pointers), so nothing is copied and no thread sees
-//! it while it is written. The channels keep their room: a search allocates nothing.
+//! How: each thread searches a run of blocks, and the results of the runs are concatenated. Runs have equal work,
+//! estimated from the last tick's runs; where they end affects only time. The input is lent to the other threads by
+//! moving it into a shared place meanwhile (three pointers), so nothing is copied and no thread sees it while it is
+//! written. The channels keep their capacity: a search allocates nothing.
 //!
-//! A thread that cannot be started, or that died, is done without: its run is searched by the tick's own.
+//! A thread that cannot be started, or that died, is skipped: its run is searched by the tick's own thread.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use super::tree::Tree;
 use crate::limits::THREADS_MAX;
 use crate::simd::boxes::{Boxes16, Level};
 
-/// What is searched, while it is lent.
+/// The input of a search, while it is lent.
 #[derive(Clone, Debug, Default)]
 struct Lent {
     live: Vec<u16>,
@@ -39,7 +39,7 @@ impl Lent {
     }
 }
 
-/// What is lent, where its owner keeps it.
+/// The same data at its owner.
 type Own<'a> = (&'a mut Vec<u16>, &'a mut Vec<Boxes16>, &'a mut Tree);
 
 /// A run of blocks to be searched.
@@ -63,7 +63,7 @@ struct Mate {
 }
 
 impl Mate {
-    /// `None` when the system gives no thread.
+    /// Starts a thread; `None` if the system gives none.
     fn start() -> Option<Self> {
         let (jobs, todo) = sync_channel::<Job>(1);
         let (tell, done) = sync_channel(1);
@@ -82,7 +82,7 @@ impl Mate {
                     finds: &mut finds,
                     search,
                 });
-                // Given back before it is told: the owner takes it as its own again.
+                // Released before the result is sent: the owner then takes it back as its sole owner.
                 drop(lent);
                 if tell.send(finds).is_err() {
                     return;
@@ -103,12 +103,12 @@ impl Mate {
     }
 }
 
-/// The other threads, and how the blocks are dealt to all.
+/// The other threads, and how blocks are split among all.
 #[derive(Debug)]
 pub(super) struct Team {
-    /// Threads at most, the tick's own with them.
+    /// Most threads, including the tick's own.
     most: usize,
-    /// Boxes compared with a block in a tick from which on others are asked.
+    /// Boxes compared with a block in a tick from which on other threads are used.
     least: u64,
     mates: Vec<Mate>,
     lent: Arc<Lent>,
@@ -116,7 +116,7 @@ pub(super) struct Team {
 }
 
 impl Default for Team {
-    /// The tick's own thread alone.
+    /// The tick's own thread only.
     fn default() -> Self {
         Self {
             most: 1,
@@ -129,7 +129,7 @@ impl Default for Team {
 }
 
 impl Clone for Team {
-    /// As many threads, of its own.
+    /// With as many threads, but its own ones.
     fn clone(&self) -> Self {
         Self {
             most: self.most,
@@ -140,25 +140,25 @@ impl Clone for Team {
 }
 
 impl Order {
-    /// Sets how many threads search without candidates at most, and from how many comparisons in a tick on.
+    /// Sets how many threads at most search without candidates, and from how many comparisons in a tick.
     pub(in crate::broad) fn use_threads(&mut self, most: usize, least: u64) {
         self.afresh.team.set(most, least);
     }
 }
 
 impl Team {
-    /// Sets how many threads there are at most, and from how much work on they are used.
+    /// Sets the most threads, and from how much work they are used.
     pub(super) fn set(&mut self, most: usize, least: u64) {
         (self.most, self.least) = (most.clamp(1, THREADS_MAX), least);
         self.mates.truncate(self.most - 1);
     }
 
-    /// As [`Team::set`] took them.
+    /// The settings of [`Team::set`].
     pub(super) fn sizes(&self) -> (usize, u64) {
         (self.most, self.least)
     }
 
-    /// Room for another search among so many blocks and bodies.
+    /// Reserves memory for another search among that many blocks and bodies.
     pub(super) fn reserve(&mut self, blocks: usize, bodies: usize) {
         for mate in &mut self.mates {
             mate.finds.reserve(blocks, bodies);
@@ -166,14 +166,14 @@ impl Team {
         }
     }
 
-    /// Gives the memory of what the others found back.
+    /// Gives back the memory of the other threads' results.
     pub(super) fn give_back(&mut self) {
         for mate in &mut self.mates {
             mate.finds.give_back();
         }
     }
 
-    /// Searches some blocks. What is near is listed behind what is listed already.
+    /// Searches some blocks. Near pairs are appended to those already listed.
     ///
     /// * `blocks` - from a multiple of `WIDTH` on.
     pub(super) fn search(
@@ -246,7 +246,7 @@ impl Team {
         self.exchange((live, fat, tree));
     }
 
-    /// Starts the threads that are missing; returns how many there are, with the tick's own.
+    /// Starts missing threads; returns how many there are, including the tick's own.
     fn gather(&mut self) -> usize {
         while self.mates.len() + 1 < self.most {
             let Some(mate) = Mate::start() else {
@@ -258,8 +258,8 @@ impl Team {
         self.mates.len() + 1
     }
 
-    /// Exchanges what is lent with what is the owner's: lends it, and takes it back. Nobody else holds it then; but for
-    /// a thread that died and has not let go yet, which keeps its own.
+    /// Swaps the lent data with the owner's: lends it, or takes it back. No other thread has a reference then, except
+    /// one that died and has not released it yet, which keeps its own copy.
     fn exchange(&mut self, (live, fat, tree): Own<'_>) {
         let lent = Arc::make_mut(&mut self.lent);
         std::mem::swap(&mut lent.live, live);
@@ -275,7 +275,7 @@ mod tests {
 
     const BLOCKS: usize = 100;
 
-    /// Blocks of boxes along a line, each meeting some that follow, the first of them many; every seventh is empty.
+    /// Blocks of boxes along a line, each meeting some later ones, the first of them many; every seventh is empty.
     fn stand() -> (Vec<u16>, Vec<Boxes16>, Tree) {
         let (mut live, mut fat, mut tree) = (vec![0; BLOCKS], Vec::new(), Tree::default());
         fat.resize(BLOCKS, Boxes16::EMPTY);
@@ -313,7 +313,7 @@ mod tests {
         }
     }
 
-    /// Everything that a search finds, in words.
+    /// Everything that a search finds, as text.
     fn search(team: &mut Team, stand: &mut (Vec<u16>, Vec<Boxes16>, Tree)) -> String {
         let mut finds = Finds::default();
         finds.reserve(BLOCKS, BLOCKS * WIDTH);
@@ -332,7 +332,7 @@ mod tests {
         for threads in 2..=THREADS_MAX {
             let mut team = Team::default();
             team.set(threads, 0);
-            // The runs end elsewhere once it is known what they take.
+            // The runs end elsewhere once their work is known.
             let ends: Vec<_> = (0..2)
                 .map(|_| {
                     assert_eq!(search(&mut team, &mut stand), alone, "{threads} threads");
@@ -365,14 +365,14 @@ mod tests {
         let mut team = Team::default();
         team.set(3, 0);
         search(&mut team, &mut stand);
-        // One takes no job, another takes it and is gone.
+        // One takes no job, another takes it and dies.
         team.mates[0].jobs = sync_channel(1).0;
         let (jobs, todo) = sync_channel::<Job>(1);
         let (_, done) = sync_channel(1);
         (team.mates[1].jobs, team.mates[1].done) = (jobs, done);
         let gone = std::thread::spawn(move || todo.recv().map(|job| job.lent));
         assert_eq!(search(&mut team, &mut stand), alone);
-        // It still holds what it was lent: the bodies have another now.
+        // It still holds the data lent to it: the owner has another copy now.
         assert!(gone.join().unwrap().is_ok());
         assert!(team.mates.is_empty());
         assert_eq!(search(&mut team, &mut stand), alone);

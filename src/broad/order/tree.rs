@@ -1,5 +1,5 @@
-//! The implicit tree over blocks: each node holds the bounds of its sixteen children, the lowest nodes those of
-//! sixteen blocks. No pointers: child `i` of node `n` is node `16 n + i` one level down.
+//! The implicit tree over blocks: each node holds the bounds of its sixteen children, the lowest nodes those of sixteen
+//! blocks. No pointers: child `i` of node `n` is node `16 n + i` one level down.
 
 use super::links::room;
 use crate::simd::boxes::{Boxes16, LANES, Lanes, Portable, WIDTH};
@@ -9,21 +9,21 @@ const _: () = assert!(WIDTH == 1 << 4, "a level is four bits of a block's number
 /// Levels a tree can have: sixteen blocks, 256, ... far more than `limits::BODIES_MAX` bodies fill.
 const LEVELS_MAX: usize = 8;
 
-/// The bound of nothing: upside down.
+/// An empty bound: inverted.
 pub(super) const NO_BOUND: [f32; 6] = {
     let (low, high) = (f32::INFINITY, f32::NEG_INFINITY);
     [low, low, low, high, high, high]
 };
 
-/// Bounds of blocks, and of what holds them.
+/// Bounds of blocks, and of the nodes above.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tree {
-    /// By block: its bound, lower and upper corner; upside down where it holds no box.
+    /// By block: its bound, lower and upper corner; inverted if it holds no box.
     bounds: Vec<[f32; 6]>,
     /// From the lowest nodes to the root; `height` of them are in use.
     levels: Vec<Vec<Boxes16>>,
     height: usize,
-    /// Nodes of the level at hand whose bounds have changed, ascending.
+    /// Nodes of the current level whose bounds have changed, ascending.
     dirty: Vec<u32>,
     /// Memory of [`Tree::query`].
     descent: Descent,
@@ -32,7 +32,7 @@ pub(super) struct Tree {
 /// Memory of a walk down the tree.
 #[derive(Clone, Debug, Default)]
 struct Descent {
-    /// The nodes of a level that are looked at; and those with children that are met: the first child, which.
+    /// The nodes of a level to visit; and the nodes with children that are met, as the first child and a bit mask.
     nodes: Vec<u32>,
     children: Vec<(u32, u16)>,
 }
@@ -48,13 +48,13 @@ impl Descent {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Walk {
     descent: Descent,
-    /// Lowest nodes that the blocks of the lowest node at hand may meet; and by node, which of these blocks do.
+    /// Lowest nodes that the blocks of the current lowest node may meet; and by node, which of these blocks do.
     nodes: Vec<u32>,
     askers: Vec<u16>,
 }
 
 impl Walk {
-    /// Room for a query that descends into every node above so many blocks.
+    /// Reserves memory for a query that visits every node above `blocks` blocks.
     pub(super) fn reserve(&mut self, blocks: usize) {
         let nodes = nodes_above(blocks);
         self.descent.reserve(nodes);
@@ -63,13 +63,13 @@ impl Walk {
     }
 }
 
-/// At least as many as nodes stand above so many blocks.
+/// Upper limit of the number of nodes above `blocks` blocks.
 fn nodes_above(blocks: usize) -> usize {
     blocks / WIDTH + WIDTH * LEVELS_MAX
 }
 
 impl Tree {
-    /// Makes room for so many blocks, all empty.
+    /// Resizes to `blocks` blocks, all empty.
     pub(super) fn reset(&mut self, blocks: usize) {
         self.bounds.clear();
         self.bounds.resize(blocks, NO_BOUND);
@@ -87,12 +87,12 @@ impl Tree {
             }
         }
         debug_assert!(level <= LEVELS_MAX);
-        // Levels that this many blocks do not need keep their memory out of sight.
+        // Levels that this many blocks do not need keep their memory, unused.
         self.height = level;
         self.dirty.clear();
     }
 
-    /// Room for so many blocks.
+    /// Reserves memory for `blocks` blocks.
     pub(super) fn reserve_blocks(&mut self, blocks: usize) {
         self.bounds
             .reserve(blocks.saturating_sub(self.bounds.len()));
@@ -108,7 +108,7 @@ impl Tree {
         }
     }
 
-    /// Room for a query that descends into every node.
+    /// Reserves memory for a query that visits every node.
     pub(super) fn reserve(&mut self) {
         let blocks = self.bounds.len();
         self.descent.reserve(nodes_above(blocks));
@@ -121,10 +121,10 @@ impl Tree {
         &self.bounds[block]
     }
 
-    /// Sets the bound of a block. To be called in ascending order of blocks, then [`Tree::refit`].
+    /// Sets the bound of a block. Must be called in ascending order of blocks, then [`Tree::refit`].
     #[inline(always)]
     pub(super) fn set(&mut self, block: usize, bound: [f32; 6]) {
-        // Of sixteen boxes one that changed has seldom been the outermost.
+        // A changed box is rarely the outermost of sixteen.
         if is_same(&self.bounds[block], &bound) {
             return;
         }
@@ -141,7 +141,7 @@ impl Tree {
         }
     }
 
-    /// Brings the nodes above changed blocks up to date.
+    /// Updates the nodes above changed blocks.
     ///
     /// Cost: the changed nodes of each level.
     #[inline(always)]
@@ -179,9 +179,9 @@ impl Tree {
 
     /// As [`Tree::query`].
     ///
-    /// * `floor` - the level of the nodes that are looked for: 0 for blocks, 1 for the lowest nodes, below the root.
-    /// * `first` - none before this one.
-    /// * `found` - what is appended to.
+    /// * `floor` - the level of the result nodes: 0 for blocks, 1 for the lowest nodes, below the root.
+    /// * `first` - earlier ones are left out.
+    /// * `found` - results are appended here.
     #[inline(always)]
     fn query_from<L: Lanes>(
         &self,
@@ -194,7 +194,7 @@ impl Tree {
         descent.nodes.clear();
         descent.nodes.push(0);
         for level in (floor + 1..self.height).rev() {
-            // None of what holds but earlier ones.
+            // Skips nodes that hold only earlier ones.
             let first = first >> (4 * (level - floor));
             let count = self.meet_children(lanes, one, (level, first), descent);
             descent.nodes.clear();
@@ -204,7 +204,7 @@ impl Tree {
         unfold(lanes, &descent.children, count, found);
     }
 
-    /// Notes which children of the nodes at hand, of some level, meet a box; returns how many. None before the first.
+    /// Finds which children of the current nodes, on some level, meet a box, none before `first`; returns how many.
     #[inline(always)]
     fn meet_children<L: Lanes>(
         &self,
@@ -214,7 +214,7 @@ impl Tree {
         descent: &mut Descent,
     ) -> usize {
         let Descent { nodes, children } = descent;
-        // A copy, which no list can change: it stays in registers.
+        // A copy, which no list can alias: it stays in registers.
         let one = *one;
         children.clear();
         children.resize(nodes.len(), (0, 0));
@@ -231,8 +231,8 @@ impl Tree {
         count
     }
 
-    /// Notes the lowest nodes from one on that it meets, and which of its blocks meet each, for [`Tree::query_among`]
-    /// of these blocks: a walk down the tree that sixteen share.
+    /// Finds the lowest nodes from `node` on that it meets, and which of its blocks meet each, for
+    /// [`Tree::query_among`] of these blocks: sixteen blocks share one walk down the tree.
     #[inline(always)]
     pub(super) fn query_nodes<L: Lanes>(&self, lanes: L, node: usize, walk: &mut Walk) {
         let Walk {
@@ -262,7 +262,7 @@ impl Tree {
         }
     }
 
-    /// The blocks whose bound meets that of a block of the node noted last, from the block on, ascending.
+    /// The blocks whose bound meets that of a block of the last queried node, from the block itself on, ascending.
     #[inline(always)]
     pub(super) fn query_among<L: Lanes>(
         &self,
@@ -277,7 +277,7 @@ impl Tree {
             nodes,
             askers,
         } = walk;
-        // Which nodes are met is a guess that fails: no branch is taken on it.
+        // Which nodes are met is unpredictable: there is no branch on it.
         let met = &mut descent.nodes;
         met.clear();
         met.resize(nodes.len(), 0);
@@ -316,13 +316,13 @@ impl Tree {
     }
 }
 
-/// Appends so many children: all that a list names, as the first child of a node and which are meant.
+/// Appends `count` children: all in a list whose items are the first child of a node and a bit mask.
 #[inline(always)]
 fn unfold<L: Lanes>(lanes: L, children: &[(u32, u16)], count: usize, found: &mut Vec<u32>) {
     let mut at = found.len();
     let end = at + count;
-    // How many of a node there are is a guess that fails: all sixteen places are written, those behind to be written
-    // over.
+    // The number of children per node is unpredictable: all sixteen places are written, and unused ones are
+    // overwritten.
     found.resize(end + WIDTH, 0);
     for (first, met) in children {
         if let Some(place) = found[at..].first_chunk_mut() {
@@ -333,7 +333,7 @@ fn unfold<L: Lanes>(lanes: L, children: &[(u32, u16)], count: usize, found: &mut
     found.truncate(end);
 }
 
-/// Whether two bounds are the same; without a branch a face.
+/// Returns whether two bounds are equal; without a branch per face.
 #[inline(always)]
 fn is_same(one: &[f32; 6], other: &[f32; 6]) -> bool {
     let faces = one.iter().zip(other);
@@ -357,7 +357,7 @@ mod tests {
     use super::*;
     use crate::ids::small;
 
-    /// Sets bounds that stand along a line, those of some blocks empty; `turn` shifts, stretches and empties others.
+    /// Sets bounds along a line, some of them empty; `turn` shifts, stretches and empties other ones.
     fn set_some(tree: &mut Tree, blocks: usize, turn: usize) {
         for block in 0..blocks {
             let places = [block / 4 + (block + turn) * 7 % 11, (block + turn) % 4];

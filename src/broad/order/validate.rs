@@ -8,8 +8,8 @@ use crate::ids::BodySlot;
 use crate::simd::boxes::{Lanes, Portable, WIDTH};
 
 impl Order {
-    /// Lanes and bodies name each other, boxes are stored and held by their fat boxes, the tree holds the fat boxes,
-    /// and the candidates and overlaps of each block are all there.
+    /// Checks that lanes and bodies refer to each other, boxes are stored and inside their fat boxes, the tree contains
+    /// the fat boxes, and the candidates and overlaps of each block are complete.
     pub(in crate::broad) fn check<P: Proxies>(
         &self,
         members: &Members,
@@ -84,7 +84,7 @@ impl Order {
         self.check_bits(proxies)
     }
 
-    /// Every bit of a candidate and of an overlap, against the boxes; few bodies only, for it looks at every pair.
+    /// Checks every bit of candidates and overlaps against the boxes; for few bodies only, since it tests every pair.
     fn check_bits<P: Proxies>(&self, proxies: &P) -> Result<(), String> {
         if self.len > 300 {
             return Ok(());
@@ -118,7 +118,7 @@ impl Order {
         Ok(())
     }
 
-    /// Each block has a part of space, and each one in the order a key.
+    /// Checks that each block has a region, and each sorted block a key.
     pub(super) fn check_homes(&self) -> Result<(), String> {
         let (homes, blocks) = (self.homes.len(), self.live.len());
         if homes != blocks.div_ceil(WIDTH) || self.keys.len() != self.sorted {
@@ -130,8 +130,8 @@ impl Order {
         Ok(())
     }
 
-    /// Every live entry is a candidate with its state, and every candidate that is not sure is listed once; while the
-    /// list is kept.
+    /// Checks, while the list is kept, that every live entry is a candidate with its state, and every uncertain
+    /// candidate is listed once.
     fn check_list(&self) -> Result<(), String> {
         if !self.listed {
             return Ok(());

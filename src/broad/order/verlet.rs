@@ -1,21 +1,21 @@
-//! A Verlet list: pairs near one another, found at once for some ticks.
+//! A Verlet list: near pairs, found by one search for several ticks.
 //!
 //! In: every box. Out: pairs that began and pairs that parted.
 //!
-//! Without candidates (`afresh`) every tick searches all boxes. Where bodies go on as they came, or wander by little
-//! (`course`), one search serves several ticks: each box is swept for so many (`swept`), what meets then is listed, and
-//! until the list is made anew a tick takes the boxes and compares what is listed (`near`). A body that leaves its
-//! swept box strays: its entries die, it gets another swept box and is looked for alone. Unlike candidates that last
-//! (`links`) the list is made for all bodies by one pass of the search, which takes a fraction of what one by one
-//! would.
+//! Without candidates (`afresh`) every tick searches all boxes. Where bodies keep their course, or wander little
+//! (`course`), one search serves several ticks: each box is swept for that many (`swept`), overlaps of swept boxes are
+//! listed, and until the list is rebuilt a tick takes the boxes and compares the listed pairs (`near`). A body that
+//! leaves its swept box strays: its entries die, it gets another swept box and is queried alone. Unlike lasting
+//! candidates (`links`) the list is made for all bodies by one search, which takes a fraction of the time of single
+//! queries.
 //!
-//! The next list is made in the last ticks of the one in use (`next`), so that no tick has a whole search. Between two
-//! lists bodies are laid anew, in an order that was sorted over the ticks before, and the entries with them.
+//! The next list is made in the last ticks of the current one (`next`), so that no tick has a whole search. Between two
+//! lists bodies are laid out again, in an order that was sorted over the ticks before, and the entries are remapped.
 //!
-//! For how many ticks a list is in use is found by going uphill on counted work, and so is whether lists pay at all
+//! The number of ticks that a list is used is found by hill climbing on counted work, as is whether lists pay at all
 //! (`pace`).
 //!
-//! Source: Verlet 1967; swept boxes in place of his spheres, so that a list lasts as long for what flies fast.
+//! Source: Verlet 1967; with swept boxes in place of spheres, so that a list lasts as long for fast bodies.
 
 use super::afresh::Afresh;
 use super::bits::each_bit;
@@ -33,29 +33,29 @@ use crate::ids::{PairKey, small};
 use crate::simd::boxes::{Down, LANES, Lanes, Portable, WIDTH, Work};
 use crate::wire::BroadMode;
 
-/// The list and what it is made from.
+/// The list and the data it is made from.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Verlet {
     /// In use: blocks and tree hold swept boxes then.
     pub(super) on: bool,
     pub(super) entries: Vec<Near>,
     pub(super) found: Vec<Found>,
-    /// The boxes of those whose entries die, during a look.
+    /// The boxes of bodies whose entries die, during a look.
     pub(super) aside: Vec<Down>,
     /// By block: lanes whose entries die in this tick; and lanes whose entries are new in it.
     pub(super) out: Vec<u16>,
     pub(super) fresh: Vec<u16>,
     /// Ranks of the latter.
     pub(super) strays: Vec<u32>,
-    /// By rank: the box to stay in, open (`Down::open`).
+    /// By rank: the box to stay in, as an open box (`Down::open`).
     pub(super) swept: Vec<Down>,
-    /// The runs of blocks that the next list is searched in.
+    /// The runs of blocks in which the next list is searched.
     pub(super) next: Shares,
-    /// By block: lanes of which nothing is taken from the search for the next list.
+    /// By block: lanes whose results are dropped from the search for the next list.
     pub(super) late: Vec<u16>,
-    /// Whether all bodies have drifted so far from the origin that they are to be measured from another.
+    /// Whether all bodies have drifted so far from the origin that it must be moved.
     pub(super) adrift: bool,
-    /// Memory kept over calls: blocks, and what of each is near a stray: its first rank, and lanes.
+    /// Memory kept across calls: blocks, and what of each is near a stray: its first rank, and lanes.
     pub(super) blocks: Vec<u32>,
     pub(super) near: Vec<(u32, u16)>,
     pub(super) pace: Pace,
@@ -75,11 +75,11 @@ impl Verlet {
     }
 }
 
-/// Bodies whose every pair a check looks for.
+/// Most bodies for which a check tests every pair.
 const FEW: usize = 300;
 
 impl Order {
-    /// Begins a list where one promises to cost less than a search in each tick.
+    /// Begins a list if it is likely to cost less than a search in each tick.
     ///
     /// * `tests` - boxes compared with a block in such a search.
     pub(super) fn try_list<P: Proxies>(
@@ -98,7 +98,7 @@ impl Order {
         }
     }
 
-    /// Lists what is near, from a tick on of which everything is told.
+    /// Lists near pairs, after a tick in which everything was reported.
     fn begin_list<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
         let Afresh {
             verlet,
@@ -112,7 +112,7 @@ impl Order {
         let span = verlet.pace.span(true);
         self.clear_lanes();
         self.take_swept(tick.proxies, Phase::Opens, span);
-        // They are all new to the list, and none has left his lane.
+        // They are all new to the list, and none has left its lane.
         let Afresh { verlet, jumped, .. } = &mut self.afresh;
         verlet.strays.clear();
         verlet.entries.clear();
@@ -122,7 +122,7 @@ impl Order {
         self.note_listed(0, tick);
     }
 
-    /// Lets go of the list; its overlaps are remembered.
+    /// Drops the list; its overlaps are saved.
     pub(super) fn end_list(&mut self) {
         let verlet = &mut self.afresh.verlet;
         verlet.on = false;
@@ -137,7 +137,7 @@ impl Order {
         }
     }
 
-    /// A tick by the list; `false` where it was let go, and bodies are to be laid anew.
+    /// A tick with the list; `false` if it was dropped, and bodies must be laid out again.
     pub(super) fn update_list<P: Proxies>(
         &mut self,
         tick: &mut Tick<'_, P>,
@@ -164,7 +164,7 @@ impl Order {
         }
         self.afresh.presort.note_late(&self.homeless, bodies);
         self.sweep_seated();
-        // With those that jumped, who are new where they were seated.
+        // Includes bodies that jumped, which are new in their lanes.
         let strays = self.afresh.verlet.strays.len();
         work.renewed += strays as u64;
         self.list_strays(tick, work);
@@ -188,7 +188,7 @@ impl Order {
         true
     }
 
-    /// A tick with the list is over.
+    /// Ends a tick with the list.
     fn note_listed<P>(&mut self, strays: usize, tick: &Tick<'_, P>) {
         let bodies = tick.members.bounded().len();
         let Verlet {
@@ -201,7 +201,7 @@ impl Order {
         fresh.fill(0);
     }
 
-    /// Nothing is known of any lane.
+    /// Clears the data of all lanes.
     pub(super) fn clear_lanes(&mut self) {
         let blocks = self.live.len();
         let Verlet {
@@ -221,7 +221,7 @@ impl Order {
         strays.clear();
     }
 
-    /// Who was given a lane in this tick is new there, and nobody knows how it moves.
+    /// A body that got a lane in this tick is new there, and its motion is unknown.
     fn sweep_seated(&mut self) {
         for at in 0..self.homeless.len() {
             let Some(rank) = self.rank(self.homeless[at]) else {
@@ -240,7 +240,7 @@ impl Order {
         }
     }
 
-    /// Sorts the bodies some more, where they are to be laid anew before the next list is begun.
+    /// Continues the sort of bodies, if they are to be laid out again before the next list begins.
     fn presort_listed(&mut self, phase: Phase, bodies: usize) {
         let Afresh {
             presort, verlet, ..
@@ -251,13 +251,13 @@ impl Order {
                 presort.go_on(&mut self.sorter, &self.boxes);
             }
         } else if phase == Phase::Lasts && verlet.pace.is_worn(bodies) {
-            // One for the boxes and the curve, and one to lay; where there are too few, after the next list.
+            // One tick for the boxes and the curve, and one for the layout; if there are too few, after the next list.
             let ticks = spare.checked_sub(2).unwrap_or(SPLIT_TICKS_MAX);
             self.begin_presort(ticks.min(SPLIT_TICKS_MAX));
         }
     }
 
-    /// Brings the bounds of the strays' blocks up to date.
+    /// Updates the bounds of the strays' blocks.
     fn bound_strays(&mut self) {
         let Verlet { strays, blocks, .. } = &mut self.afresh.verlet;
         blocks.clear();
@@ -272,7 +272,7 @@ impl Order {
         self.afresh.verlet.blocks = blocks;
     }
 
-    /// Looks for what is near the strays, and lists it.
+    /// Searches what is near the strays, and lists it.
     fn list_strays<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
         for at in 0..self.afresh.verlet.strays.len() {
             let rank = self.afresh.verlet.strays[at] as usize;
@@ -289,14 +289,14 @@ impl Order {
         self.look_listed(listed, false, tick);
     }
 
-    /// How many entries overlap.
+    /// Number of entries that overlap.
     pub(super) fn count_listed(&self) -> usize {
         let entries = &self.afresh.verlet.entries;
         entries.iter().filter(|entry| entry.is_hit()).count()
     }
 
-    /// Boxes are stored as they are and lie in their swept ones, which stand in the blocks; no pair is listed twice;
-    /// and where there are few bodies, those that overlap are listed so.
+    /// Checks that boxes are stored unchanged and lie in their swept ones, which are in the blocks; that no pair is
+    /// listed twice; and, with few bodies, that overlapping ones are listed as such.
     pub(super) fn check_listed<P: Proxies>(
         &self,
         bodies: &[BodySlot],
@@ -346,7 +346,7 @@ impl Order {
     }
 }
 
-/// Asks the tree for what is near each stray.
+/// Queries the tree for what is near each stray.
 struct Seek<'a> {
     order: &'a mut Order,
 }
@@ -369,14 +369,14 @@ impl Work for Seek<'_> {
             blocks.clear();
             order.tree.query(lanes, &one, &mut blocks);
             near.clear();
-            // One more: it is read, and nothing is made of it.
+            // One extra entry: it is read, and its value is not used.
             near.resize(blocks.len() + 1, (0, 0));
             let verlet = &mut order.afresh.verlet;
             let (mut kept, mut pairs) = (0, 0);
             for other in &blocks {
                 let theirs = *other as usize;
                 let met = lanes.meets(&order.fat[theirs], &one);
-                // Two strays list each other once, and none itself.
+                // Two strays list each other once, and none lists itself.
                 let first = small(theirs * WIDTH);
                 let upto = (rank + 1).saturating_sub(first).min(LANES);
                 let before = u16::MAX.checked_shr(LANES - upto).unwrap_or(0);

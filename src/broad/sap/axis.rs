@@ -1,12 +1,11 @@
 //! One axis: the ends of all boxes in order, kept across ticks.
 //!
-//! In: boxes that moved, came or left. Out: the list sorted again, and each pair of which a lower end passed an upper
-//! one, that is, which began to overlap on this axis. Ends of overlaps are not reported: the pairs of a moved body
-//! are few and are looked at directly, while the passings of ends are many.
+//! In: boxes that moved, came or left. Out: the list sorted again, and each pair whose lower end passed an upper one,
+//! that is, which began to overlap on this axis. Ends of overlaps are not reported: the pairs of a moved body are few
+//! and are tested directly, while passing ends are many.
 //!
-//! Ends compare by value, at equal values lower before upper, so that touching is overlap. The order among lower ends
-//! (or among upper ends) of equal value decides nothing and is left as it comes; results are put in the order of ids
-//! later.
+//! Ends are compared by value, at equal values lower before upper, so that touching counts as overlap. The order among
+//! lower ends (or among upper ends) of equal value does not matter and is arbitrary; results are sorted by id later.
 
 use crate::broad::members::{Bounds, LEFT, Members};
 use crate::ids::{BodySlot, small};
@@ -18,7 +17,7 @@ const GATHER: usize = 32;
 /// Position of an end that is not in the list.
 const NOWHERE: u32 = u32::MAX;
 
-/// A value as an integer in the same order; minus zero is zero, NaN stands beyond the infinities.
+/// A value as an integer with the same order; minus zero equals zero, NaN comes after the infinities.
 pub(super) fn rank(value: f64) -> u64 {
     let bits = (value + 0.0).to_bits();
     if bits >> 63 == 1 {
@@ -52,26 +51,26 @@ impl End {
         BodySlot(self.tag >> 1)
     }
 
-    /// Whether it is the upper end.
+    /// Returns whether it is the upper end.
     #[inline]
     pub(super) fn upper(self) -> bool {
         self.tag & 1 == 1
     }
 
-    /// Whether its body left.
+    /// Returns whether its body left.
     #[inline]
     fn dead(self) -> bool {
         self.tag == DEAD
     }
 
-    /// Whether it must stand before `other`.
+    /// Returns whether it must come before `other`.
     #[inline]
     fn before(self, other: Self) -> bool {
         self.key < other.key || (self.key == other.key && !self.upper() & other.upper())
     }
 }
 
-/// What passings an axis reports and how many it may make.
+/// Which passings an axis reports, and how many it may make.
 pub(super) struct Passing<'a, T> {
     /// Boxes by slot, those of this tick.
     pub(super) bounds: &'a [Bounds],
@@ -79,14 +78,14 @@ pub(super) struct Passing<'a, T> {
     pub(super) test: T,
     /// Takes the pair.
     pub(super) met: &'a mut Vec<(BodySlot, BodySlot)>,
-    /// Swaps left before it is cheaper to sort anew.
+    /// Swaps left before sorting from scratch is cheaper.
     pub(super) allowance: u64,
     /// Boxes compared.
     pub(super) tests: u64,
 }
 
 impl<T: Fn(&Bounds, &Bounds) -> bool> Passing<'_, T> {
-    /// A lower end of the one passed an upper end of the other.
+    /// A lower end of `one` passed an upper end of `other`.
     #[inline]
     fn meet(&mut self, one: BodySlot, other: BodySlot) {
         self.tests += 1;
@@ -95,10 +94,10 @@ impl<T: Fn(&Bounds, &Bounds) -> bool> Passing<'_, T> {
         }
     }
 
-    /// The lower end of `one` passed all `ends` but the first, which is its own place.
+    /// The lower end of `one` passed all `ends` except the first, which is its own position.
     #[inline]
     fn meet_all(&mut self, one: BodySlot, ends: &[End]) {
-        // Which ends are upper ones is as good as random, so they are gathered without a branch.
+        // Which ends are upper ones is unpredictable, so they are gathered without a branch.
         for chunk in ends.get(1..).unwrap_or_default().chunks(GATHER) {
             let mut uppers = [0_u32; GATHER];
             let mut len = 0;
@@ -117,16 +116,16 @@ impl<T: Fn(&Bounds, &Bounds) -> bool> Passing<'_, T> {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Axis {
     ends: Vec<End>,
-    /// By slot: positions of the lower and the upper end; right only while `placed`.
+    /// By slot: positions of the lower and the upper end; valid only while `placed`.
     places: Vec<[u32; 2]>,
     placed: bool,
     dead: usize,
-    /// Ends that wait while the list makes room for them.
+    /// New ends, while the list makes room for them.
     waiting: Vec<End>,
 }
 
 impl Axis {
-    /// All ends anew, sorted.
+    /// Collects and sorts all ends from scratch.
     pub(super) fn sort(&mut self, members: &Members, axis: usize) {
         self.ends.clear();
         for slot in members.bounded() {
@@ -139,7 +138,7 @@ impl Axis {
         self.placed = false;
     }
 
-    /// Empties the list: the axis is not kept.
+    /// Clears the list: the axis is not kept.
     pub(super) fn drop_all(&mut self) {
         *self = Self::default();
     }
@@ -150,7 +149,7 @@ impl Axis {
         lower.map(|end| end.slot())
     }
 
-    /// How many pairs of bodies overlap on this axis: its clumping.
+    /// Number of pairs of bodies that overlap on this axis: its clumping.
     pub(super) fn crowding(&self) -> u64 {
         let (mut open, mut pairs) = (0_u64, 0_u64);
         for end in self.ends.iter().filter(|end| !end.dead()) {
@@ -164,8 +163,8 @@ impl Axis {
         pairs
     }
 
-    /// Puts the ends of all moved boxes in order, in one pass of insertion sort over the list; how many swaps it
-    /// took, `None` when the allowance did not suffice (the list is then no longer in order).
+    /// Puts the ends of all moved boxes in order, in one pass of insertion sort over the list; returns the number of
+    /// swaps, or `None` when the allowance did not suffice (the list is then out of order).
     pub(super) fn settle_all<T: Fn(&Bounds, &Bounds) -> bool>(
         &mut self,
         axis: usize,
@@ -183,7 +182,7 @@ impl Axis {
             }
             let mut to = at;
             if end.upper() {
-                // An upper end that goes down ends overlaps, which are not reported.
+                // An upper end that moves down ends overlaps, which are not reported.
                 while to > 0 && self.ends[to - 1].key > end.key {
                     self.ends[to] = self.ends[to - 1];
                     to -= 1;
@@ -218,7 +217,7 @@ impl Axis {
         let bounds = &passing.bounds[slot.index()];
         let [low, high] = [false, true].map(|upper| End::new(slot, upper, bounds, axis));
         let at = self.places.get(slot.index())?[0];
-        // The end that leads the motion goes first, so that the two do not pass one another.
+        // The end that leads the motion goes first, so that the two do not pass each other.
         let first_low = low.key <= self.ends.get(at as usize)?.key;
         let order = if first_low { [low, high] } else { [high, low] };
         let mut swaps = 0;
@@ -230,7 +229,7 @@ impl Axis {
         Some(swaps)
     }
 
-    /// Moves one end to where its new value belongs.
+    /// Moves one end to the position of its new value.
     fn slide<T: Fn(&Bounds, &Bounds) -> bool>(
         &mut self,
         end: End,
@@ -271,7 +270,7 @@ impl Axis {
         }
     }
 
-    /// Brings the positions up to date.
+    /// Updates the positions.
     pub(super) fn place_all(&mut self) {
         if self.placed {
             return;
@@ -286,7 +285,7 @@ impl Axis {
         self.placed = true;
     }
 
-    /// Takes out the ends of the bodies that left: a few are marked dead where they stand, many are swept out.
+    /// Removes the ends of bodies that left: a few are marked dead in place, many are removed in one pass.
     pub(super) fn leave(&mut self, left: &[BodySlot], members: &Members) {
         let few = left.len() * 32 < self.ends.len();
         if few {
@@ -310,7 +309,7 @@ impl Axis {
         }
     }
 
-    /// Puts in the ends of bodies that came, all at their place in one pass from the back.
+    /// Inserts the ends of bodies that came, all in one pass from the back.
     pub(super) fn merge(&mut self, came: &[BodySlot], members: &Members, axis: usize) {
         let old = self.ends.len();
         for slot in came {
@@ -334,7 +333,7 @@ impl Axis {
         self.placed = false;
     }
 
-    /// Checks order, keys and positions, and that each bounded body stands here once.
+    /// Checks order, keys and positions, and that each bounded body is listed once.
     pub(super) fn validate(&self, members: &Members, axis: usize) -> Result<(), String> {
         let all = self.ends.len() - self.dead;
         if all != 2 * members.bounded().len() {

@@ -2,18 +2,18 @@
 //!
 //! In: which bodies left, came and moved. Out: pairs that may have begun to overlap.
 //!
-//! * Few bodies moved: each of their ends slides to its new place. Nothing else is touched, so 1 % of the bodies cost
-//!   1 % of the work.
+//! * Few bodies moved: each of their ends slides to its new place. Nothing else is touched, so 1 % of the bodies cost 1
+//!   % of the work.
 //! * Many moved: one pass of insertion sort over each list, in memory order.
-//! * Too many ends would pass one another (jumps): sort anew and sweep once along the clearest axis. The bound is
-//!   counted swaps, so the worst case is about twice the cheaper way.
-//! * A pair begins when a lower end passes an upper one on some axis and the boxes overlap; a pair ends when the boxes
-//!   of a moved body no longer overlap, which its few pairs tell without the lists.
-//! * Bodies that come are merged in, in one pass; their pairs are found by looking at every box, or by a sweep.
+//! * Too many ends would pass one another (jumps): sort from scratch and sweep once along the clearest axis. The bound
+//!   is on counted swaps, so the worst case is about twice the cheaper way.
+//! * A pair begins when a lower end passes an upper one on some axis and the boxes overlap. A pair ends when the boxes
+//!   of a moved body no longer overlap; its few stored pairs show that without the lists.
+//! * Bodies that come are merged in one pass; their pairs are found by testing every box, or by a sweep.
 //! * An axis on which everything overlaps is skipped (`choose`, `partial`).
 //!
-//! Refused: reporting parted pairs from swaps. At 10,000 bodies that move 1 % of their size an end passes about 18
-//! others on each axis, and only one passing in some hundred concerns a stored pair.
+//! Refused: reporting parted pairs from swaps. With 10,000 bodies that move 1 % of their size an end passes about 18
+//! others on each axis, and only about one swap in a hundred concerns a stored pair.
 
 use super::Work;
 use super::members::{ASKED, Bounds, CAME, MOVED, Members};
@@ -29,7 +29,7 @@ use choose::Choice;
 use partial::Partial;
 use sweep::{Course, Sweep};
 
-/// One moved body in so many, and the lists are repaired in one pass rather than end by end.
+/// When one in `MANY_MOVED` bodies moved, the lists are repaired in one pass rather than end by end.
 const MANY_MOVED: usize = 8;
 
 /// The sorted lists.
@@ -84,7 +84,7 @@ impl Sap {
         work.axes = std::array::from_fn(|k| self.choice.keeps(k));
     }
 
-    /// Parts the touched bodies into those that came, moved, are asked.
+    /// Splits the touched bodies into those that came, moved, or are queried.
     fn sort_out(&mut self, members: &Members) {
         self.met.clear();
         self.came.clear();
@@ -105,7 +105,7 @@ impl Sap {
         }
     }
 
-    /// Counts overlaps on each axis kept; whether the axes change.
+    /// Counts overlaps on each kept axis; returns whether the axes change.
     fn look(&mut self, bodies: usize) -> bool {
         for axis in self.choice.kept().iter().copied() {
             let pairs = self.axes[axis].crowding();
@@ -114,7 +114,7 @@ impl Sap {
         self.choice.decide(bodies)
     }
 
-    /// Puts moved ends in order; `false` when that takes more than sorting anew.
+    /// Puts moved ends in order; `false` when that takes more than sorting from scratch.
     fn repair(&mut self, members: &Members, work: &mut Work) -> bool {
         let bodies = members.bounded().len();
         let many = self.moved.len() * MANY_MOVED > bodies;
@@ -157,14 +157,14 @@ impl Sap {
         fits
     }
 
-    /// Takes in the bodies that came, and finds the pairs of those that are asked.
+    /// Adds the bodies that came, and finds the pairs of queried bodies.
     fn admit(&mut self, members: &Members, work: &mut Work) {
         if !self.came.is_empty() {
             for axis in self.choice.kept().iter().copied() {
                 self.axes[axis].merge(&self.came, members, axis);
             }
         }
-        // While an axis is skipped, the pairs of two axes know all about bodies that are merely asked again.
+        // While an axis is skipped, the two-axis pairs already cover bodies that are merely queried again.
         let skipped = self.choice.skipped();
         let who = if skipped.is_some() {
             &self.came
@@ -194,7 +194,7 @@ impl Sap {
         work.tests += who.len() as u64 * members.bounded().len() as u64;
     }
 
-    /// Sorts every list anew and finds the pairs of all touched bodies by one sweep.
+    /// Sorts every list from scratch and finds the pairs of all touched bodies by one sweep.
     fn resort(&mut self, members: &Members, work: &mut Work) {
         work.rebuilds += 1;
         self.partial.clear();
@@ -221,7 +221,7 @@ impl Sap {
         }
     }
 
-    /// Sweeps along the clearest axis; `false` when an axis is skipped and the pairs of the others are too many.
+    /// Sweeps along the clearest axis; `false` when an axis is skipped and the two-axis pairs are too many.
     fn sweep_all(
         &mut self,
         members: &Members,
@@ -244,7 +244,7 @@ impl Sap {
         fits
     }
 
-    /// Checks lists and pairs of two axes.
+    /// Checks the lists and the two-axis pairs.
     pub(super) fn validate(&self, members: &Members) -> Result<(), String> {
         for axis in self.choice.kept().iter().copied() {
             self.axes[axis].validate(members, axis)?;

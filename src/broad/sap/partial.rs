@@ -1,17 +1,17 @@
-//! Pairs that overlap on the two axes kept, while the third is skipped.
+//! Pairs that overlap on the two kept axes, while the third is skipped.
 //!
 //! In: pairs that began to overlap on both. Out: those whose boxes overlap on the third as well. Filters are not
-//! asked here: these are pairs of boxes, not of the pair set.
+//! applied here: these are pairs of boxes, not of the pair set.
 
 use crate::broad::members::{ASKED, MOVED, Members};
 use crate::ids::{BodySlot, PairKey, PairSlot};
 use crate::pairs::PairSet;
 
-/// The pairs of two axes.
+/// The two-axis pairs.
 #[derive(Clone, Debug)]
 pub(super) struct Partial {
     pairs: PairSet,
-    /// By pair: whether the boxes overlapped when last looked at. A hint that spares lookups, nothing more.
+    /// By pair: whether the boxes overlapped on all axes at the last test. Only a hint that saves lookups.
     whole: Vec<bool>,
     keys: Vec<PairKey>,
     parted: Vec<PairSlot>,
@@ -29,17 +29,17 @@ impl Default for Partial {
 }
 
 impl Partial {
-    /// Pairs kept.
+    /// Number of pairs kept.
     pub(super) fn len(&self) -> usize {
         self.pairs.len()
     }
 
-    /// Forgets all.
+    /// Removes all.
     pub(super) fn clear(&mut self) {
         self.pairs.clear();
     }
 
-    /// Takes out the pairs of a body that left.
+    /// Removes the pairs of a body that left.
     pub(super) fn leave(&mut self, slot: BodySlot) {
         self.pairs.list(1);
         self.parted.extend(self.pairs.pairs_of(slot));
@@ -48,7 +48,7 @@ impl Partial {
         }
     }
 
-    /// Takes pairs in, each once, also if it is here already.
+    /// Adds pairs, without duplicates.
     pub(super) fn add(&mut self, met: &mut Vec<(BodySlot, BodySlot)>) {
         self.pairs.open_tick();
         self.keys.clear();
@@ -68,8 +68,8 @@ impl Partial {
         }
     }
 
-    /// Looks at the pairs of all touched bodies: drops those that parted on a kept axis, reports those that now
-    /// overlap wholly, and all that do of bodies that are asked.
+    /// Tests the pairs of all touched bodies: drops those that parted on a kept axis, reports those that now overlap on
+    /// all axes, and all overlapping pairs of bodies that are queried.
     pub(super) fn walk(
         &mut self,
         kept: [usize; 2],
@@ -86,7 +86,7 @@ impl Partial {
                 let theirs = members.bounds(other);
                 tests += 1;
                 if !mine.meets(theirs, kept[0]) || !mine.meets(theirs, kept[1]) {
-                    // Of two touched bodies the lower drops the pair.
+                    // If both bodies are touched, the lower slot drops the pair.
                     if *slot < other || !members.has(other, MOVED | ASKED) {
                         self.parted.push(pair);
                     }
@@ -105,7 +105,7 @@ impl Partial {
         tests
     }
 
-    /// Checks the set against the boxes: each pair overlaps on both axes kept.
+    /// Checks the set against the boxes: each pair overlaps on both kept axes.
     pub(super) fn validate(&self, kept: [usize; 2], members: &Members) -> Result<(), String> {
         self.pairs.validate()?;
         for (slot, key) in self.pairs.iter() {

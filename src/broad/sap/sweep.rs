@@ -1,23 +1,23 @@
-//! One sweep over one axis: all pairs of boxes at once, for a list that was just sorted or for many new bodies.
+//! One sweep along one axis: all pairs of boxes at once, for a list that was just sorted or for many new bodies.
 //!
-//! In: bodies in order of their lower ends. Out: pairs that overlap on the axes asked for.
+//! In: bodies in order of their lower ends. Out: pairs that overlap on the requested axes.
 //!
-//! The boxes are copied into bands of the second axis, in the order of the sweep, so that the inner loop reads memory
-//! in a line and meets only bodies that are near on two axes: in a gas of 10,000 boxes that is 9 times fewer
-//! comparisons than along one axis alone. A body stands in each band that it touches, and a pair is reported in the
-//! band where the later of the two begins, so exactly once. Bodies that touch many bands are compared with everything.
+//! The boxes are copied into bands of the second axis, in sweep order, so that the inner loop reads memory sequentially
+//! and meets only bodies that are near on two axes: in a gas of 10,000 boxes that is 9 times fewer comparisons than
+//! along one axis alone. A body is in each band that it touches, and a pair is reported in the band where the later of
+//! the two begins, so exactly once. Bodies that touch many bands are compared with everything.
 
 use super::axis::Axis;
 use crate::broad::members::{Bounds, Members};
 use crate::ids::{BodySlot, small};
 
-/// Bands that one body may stand in; one that touches more is compared with all.
+/// Bands that one body may be in; one that touches more is compared with all.
 const BANDS_PER_BODY: usize = 4;
-/// Width of a band over the mean width of a body: narrower, and bodies stand in too many bands.
+/// Width of a band relative to the mean width of a body: with narrower bands, bodies are in too many of them.
 const BAND_WIDTHS: f64 = 2.0;
-/// Fewest bodies a band is worth.
+/// Fewest bodies per band.
 const BODIES_PER_BAND: usize = 16;
-/// Boxes compared before the hits among them are looked at.
+/// Boxes compared before their hits are evaluated.
 const CHUNK: usize = 32;
 
 /// A body in the order of the sweep.
@@ -30,26 +30,26 @@ struct Item {
     asked: bool,
 }
 
-/// What the inner loop reads of a body: its box on the two axes compared, upper ends negated, so that one box meets
-/// another where four numbers are not above four others: compares without a branch, two at a time.
+/// The part of a body that the inner loop reads: its box on the two compared axes, upper ends negated, so that two
+/// boxes overlap when four numbers do not exceed four others: compares without a branch, two at a time.
 type Near = [f64; 4];
 
-/// A box as it is compared with others.
+/// A box in the form in which it is tested.
 fn near(bounds: &Bounds, beside: [usize; 2]) -> Near {
     let [one, two] = beside;
     let (min, max) = (&bounds.min, &bounds.max);
     [min[one], min[two], -max[one], -max[two]]
 }
 
-/// What others are compared with.
+/// The limits of a box that other boxes are tested against.
 fn limits(bounds: &Bounds, beside: [usize; 2]) -> Near {
     let [one, two] = beside;
     let (min, max) = (&bounds.min, &bounds.max);
     [max[one], max[two], -min[one], -min[two]]
 }
 
-/// How the second axis is cut into bands. Where a value lies never decreases with the value, which is all that
-/// correctness needs.
+/// How the second axis is cut into bands. The band index is monotonic in the value, which is all that correctness
+/// needs.
 #[derive(Clone, Copy, Debug)]
 struct Bands {
     from: f64,
@@ -58,7 +58,7 @@ struct Bands {
 }
 
 impl Bands {
-    /// The band of a value; infinities lie in the outer ones.
+    /// The band of a value; infinities are in the outer ones.
     fn at(&self, value: f64) -> usize {
         #[allow(
             clippy::cast_possible_truncation,
@@ -70,39 +70,39 @@ impl Bands {
     }
 }
 
-/// Where a sweep goes.
+/// Parameters of a sweep.
 #[derive(Debug)]
 pub(super) struct Course<'a> {
     /// The sorted axis.
     pub(super) axis: &'a Axis,
-    /// Its number.
+    /// Its index.
     pub(super) along: usize,
-    /// The axes that are compared.
+    /// The compared axes.
     pub(super) beside: [usize; 2],
     /// Most pairs to report.
     pub(super) most: usize,
 }
 
-/// Memory of the sweep, kept over updates.
+/// Memory of the sweep, kept across updates.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sweep {
     /// All bodies with a box, in order of their lower ends.
     items: Vec<Item>,
     /// Copies of them by band, each in the same order.
     banded: Vec<Item>,
-    /// Lower ends of `banded`: a shorter line to read when looking for the last candidate.
+    /// Lower ends of `banded`: a compact array to scan for the last candidate.
     lowers: Vec<f64>,
-    /// Boxes of `banded` on the two axes compared.
+    /// Boxes of `banded` on the two compared axes.
     nears: Vec<Near>,
     /// Where each band starts in `banded`.
     starts: Vec<usize>,
-    /// Places in `items` of bodies that touch many bands.
+    /// Indices in `items` of bodies that touch many bands.
     wide: Vec<usize>,
 }
 
 impl Sweep {
-    /// Reports pairs that overlap on all axes of the course, of which at least one body is `asked`; `false` when they
-    /// are too many. Counts comparisons.
+    /// Reports pairs that overlap on all axes of the course with at least one `asked` body; `false` when they are too
+    /// many. Counts comparisons.
     pub(super) fn run(
         &mut self,
         course: &Course<'_>,
@@ -199,7 +199,7 @@ impl Sweep {
         let total = self.starts[bands.len];
         self.banded.clear();
         self.banded.resize(total, *any);
-        // Each start is used as the place of the next body, and so becomes the start of the band after.
+        // Each start serves as the position of the next body, and so becomes the start of the band after.
         let mut wide = self.wide.iter().peekable();
         for (at, item) in self.items.iter().enumerate() {
             if wide.next_if_eq(&&at).is_some() {
@@ -220,7 +220,7 @@ impl Sweep {
         }
     }
 
-    /// Compares the bodies that touch many bands with all others, and with one another once.
+    /// Compares the bodies that touch many bands with all others, and with each other once.
     fn sweep_wide(&self, course: &Course<'_>, met: &mut Vec<(BodySlot, BodySlot)>) -> u64 {
         let mut is_wide = self.wide.iter().copied().peekable();
         for (at, other) in self.items.iter().enumerate() {

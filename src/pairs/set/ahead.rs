@@ -1,18 +1,18 @@
-//! Memory asked for ahead: what lists of pairs that are looked up, taken out or put in will touch, a few pairs before.
+//! Prefetching for lists of pairs to look up, remove or insert, a few pairs ahead.
 //!
-//! Pairs of a list stand anywhere in the set; without it each would wait for memory several times, one wait after the
-//! other (measured: half the time of ticks in which most pairs change).
+//! The pairs of a list are anywhere in the set; without prefetching each would cause several cache misses, one after
+//! the other (measured: half the time of ticks in which most pairs change).
 
 use super::{Ended, PairSet};
 use crate::ids::PairKey;
 use crate::simd::boxes::prefetch;
 
-/// How many pairs ahead memory is asked for: one takes some 30 ns, memory some 100.
+/// How many pairs ahead memory is prefetched: a pair takes some 30 ns, a memory access some 100.
 const AHEAD: usize = 8;
 
 impl PairSet {
-    /// Of a list of keys, asks for what the lookup of one a few places on will read to be brought near: a lookup is
-    /// two reads anywhere, one after the other.
+    /// Prefetches the lookup of a key some positions ahead in a list: a lookup is two dependent reads at random
+    /// addresses.
     #[inline]
     pub(super) fn prefetch_find(&self, keys: &[PairKey], at: usize) {
         if let Some(key) = keys.get(at + 2 * AHEAD) {
@@ -25,8 +25,7 @@ impl PairSet {
         }
     }
 
-    /// Of a list of pairs to be taken out of the lists of their bodies, asks for what that of one a few places on will
-    /// touch to be brought near.
+    /// Prefetches what the removal of a pair some positions ahead will touch in the lists of its bodies.
     #[inline]
     pub(super) fn prefetch_unlink(&self, ended: &[Ended], at: usize) {
         if let Some(next) = ended.get(at + 2 * AHEAD) {
@@ -37,7 +36,7 @@ impl PairSet {
         }
     }
 
-    /// Of a list of pairs to be put in, asks for what that of one a few places on will touch to be brought near.
+    /// Prefetches what the insertion of a pair some positions ahead will touch.
     #[inline]
     pub(super) fn prefetch_insert(&self, keys: &[PairKey], at: usize) {
         let is_listed = self.lists.is_kept();
@@ -47,7 +46,7 @@ impl PairSet {
                 self.lists.prefetch_heads(*key);
             }
         }
-        // It goes before the first pair of each of the two.
+        // It is inserted before the first pair of each of the two bodies.
         if let Some(key) = keys.get(at + AHEAD).filter(|_| is_listed) {
             self.lists.prefetch_seconds(*key);
         }

@@ -1,4 +1,4 @@
-//! Which slots of the set are free: a bit each, so that the lowest is found without any order being kept.
+//! The free slots of the set: one bit each, so that the lowest is found without keeping any order.
 
 use crate::ids::{PairSlot, small};
 
@@ -9,18 +9,18 @@ const BITS: usize = u64::BITS as usize;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Free {
     words: Vec<u64>,
-    /// No word before this one has any.
+    /// No word before this one has a free slot.
     from: usize,
     len: usize,
 }
 
 impl Free {
-    /// How many.
+    /// Number of free slots.
     pub(super) fn len(&self) -> usize {
         self.len
     }
 
-    /// Room for so many slots.
+    /// Reserves room for `slots` slots.
     pub(super) fn cover(&mut self, slots: usize) {
         let words = slots.div_ceil(BITS);
         if words > self.words.len() {
@@ -40,7 +40,7 @@ impl Free {
         self.len += 1;
     }
 
-    /// Takes the lowest.
+    /// Takes the lowest free slot.
     #[inline]
     pub(super) fn take(&mut self) -> Option<u32> {
         let rest = self.words.get(self.from..)?;
@@ -55,7 +55,7 @@ impl Free {
             .map(|first| first + bit)
     }
 
-    /// Forgets a slot that is free: it is no more.
+    /// Removes a free slot that no longer exists.
     pub(super) fn drop_slot(&mut self, slot: usize) {
         debug_assert!(self.has(slot));
         if let Some(word) = self.words.get_mut(slot / BITS) {
@@ -64,7 +64,7 @@ impl Free {
         }
     }
 
-    /// Of so many slots those that are not free, ascending.
+    /// The slots below `slots` that are not free, ascending.
     pub(super) fn others(&self, slots: usize) -> impl Iterator<Item = PairSlot> + '_ {
         let words = (0..slots.div_ceil(BITS)).map(move |at| {
             let last = slots - at * BITS;
@@ -86,13 +86,13 @@ impl Free {
         })
     }
 
-    /// None is.
+    /// Makes none free.
     pub(super) fn clear(&mut self) {
         self.words.fill(0);
         (self.from, self.len) = (0, 0);
     }
 
-    /// Whether a slot is.
+    /// Returns whether a slot is free.
     pub(super) fn has(&self, slot: usize) -> bool {
         let word = self.words.get(slot / BITS);
         word.is_some_and(|word| word >> (slot % BITS) & 1 == 1)

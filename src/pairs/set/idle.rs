@@ -1,14 +1,14 @@
-//! Slots and memory of pairs that are no more.
+//! Slots and memory of pairs that are gone.
 //!
-//! The lowest slots are used first, so that those of a crowd which is over empty from the end: what runs parallel to
-//! the slots is as long as the pairs of now ask for.
+//! The lowest slots are used first, so that after a crowd the slots empty from the end: arrays parallel to the slots
+//! are only as long as the present pairs need.
 
 use super::{GROWTH, LEAST, PairKey, PairSet};
 use crate::ids::PairSlot;
 
 impl PairSet {
-    /// Cuts free slots off the end, right after a tick was opened, and gives their memory back when they have been very
-    /// many for long.
+    /// Removes free slots from the end, right after a tick was opened, and gives their memory back if they have been
+    /// very many for long.
     pub(super) fn cut(&mut self) {
         while self.keys.last() == Some(&PairKey::NOBODY) {
             self.keys.pop();
@@ -19,13 +19,13 @@ impl PairSet {
         }
     }
 
-    /// The slots of pairs, ascending: passes over those that are free by many at once.
+    /// The slots of pairs, ascending: skips free ones by whole words.
     pub(crate) fn used_slots(&self) -> impl Iterator<Item = PairSlot> + '_ {
         let used = self.free.others(self.keys.len());
         used.filter(|slot| self.get(*slot).is_some())
     }
 
-    /// Gives the memory of many more pairs than there are back, right after a tick was opened. Slots of pairs stay.
+    /// Gives back memory for many more pairs than there are, right after a tick was opened. Slots of pairs stay.
     pub(crate) fn give_back(&mut self) {
         debug_assert!(
             self.resting.is_empty(),

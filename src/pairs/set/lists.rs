@@ -1,10 +1,9 @@
-//! For each body the list of its pairs: kept only while somebody reads them.
+//! For each body the list of its pairs: kept only while they are read.
 //!
-//! In: pairs that come and go. Out: the pairs of one body. Where most bodies move, nobody asks for the pairs of one,
-//! and to keep the lists in step would be half of what a pair that comes or goes costs. So they are let go of once what
-//! they cost since the last question is as much as to make them anew, and made when so many bodies have been asked for,
-//! each by a look at every pair, that this cost as much: all in all some twice the cost of knowing beforehand at most.
-//! Their memory stays for the next time.
+//! In: pairs that come and go. Out: the pairs of one body. Where most bodies move, nothing reads the lists, and their
+//! upkeep would be half the cost of adding or removing a pair. So they are dropped once upkeep since the last read has
+//! cost as much as a rebuild, and rebuilt once lookups by full scans have cost as much. In total at most about twice
+//! the cost of knowing in advance. Their memory is kept.
 
 use crate::ids::{BodySlot, PairKey, PairSlot};
 use crate::simd::boxes::prefetch;
@@ -12,8 +11,8 @@ use crate::simd::boxes::prefetch;
 /// No pair.
 const NONE: u32 = u32::MAX;
 
-/// One of the two places of a pair, by twice the pair's slot and one more for the higher body: the places before and
-/// behind it in that body's list.
+/// One of the two list nodes of a pair; its index is twice the pair's slot, plus one for the higher body. Holds the
+/// neighbours in that body's list.
 #[derive(Clone, Copy, Debug)]
 struct Half {
     next: u32,
@@ -28,32 +27,32 @@ impl Half {
     };
 }
 
-/// To make the lists costs as much as so many looks at every pair: some 10 ns a pair, and half of one.
+/// Building the lists costs as much as this many full scans: some 10 ns per pair against 0.5 ns.
 const LOOKS: usize = 16;
 
 /// The lists of all bodies.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lists {
-    /// By body: the first place of its list.
+    /// By body: the first node of its list.
     heads: Vec<u32>,
     halves: Vec<Half>,
     is_kept: bool,
-    /// Pairs that were put in and taken out since the lists were last asked for.
+    /// Pairs added and removed since the lists were last read.
     upkeep: usize,
-    /// Bodies asked for since the lists were let go of.
+    /// Bodies looked up since the lists were dropped.
     asked: usize,
 }
 
 impl Lists {
-    /// Whether they are in step with the set.
+    /// Returns whether the lists are in step with the set.
     pub(super) fn is_kept(&self) -> bool {
         self.is_kept
     }
 
-    /// So many bodies are about to be asked for: makes the lists if that pays.
+    /// Announces lookups of `bodies` bodies: builds the lists if that pays.
     ///
-    /// * `keys` - by slot, as the set has them.
-    /// * `pairs` - those of the set.
+    /// * `keys` - the set's keys, by slot.
+    /// * `pairs` - the pairs of the set.
     pub(super) fn ask(
         &mut self,
         bodies: usize,
@@ -81,14 +80,14 @@ impl Lists {
         self.upkeep = 0;
     }
 
-    /// So many pairs are about to come or to go, of so many: lists that nobody reads are let go of.
+    /// Announces changes of pairs: drops lists that nothing reads.
     pub(super) fn weigh(&mut self, changes: usize, pairs: usize) {
         if self.is_kept && self.upkeep + changes > pairs {
             (self.is_kept, self.asked) = (false, 0);
         }
     }
 
-    /// Room for so many slots.
+    /// Reserves room for `room` slots.
     pub(super) fn cover(&mut self, room: usize) {
         if self.is_kept {
             let more = (2 * room).saturating_sub(self.halves.len());
@@ -96,13 +95,13 @@ impl Lists {
         }
     }
 
-    /// Empties every list.
+    /// Clears every list.
     pub(super) fn clear(&mut self) {
         self.heads.clear();
         self.halves.clear();
     }
 
-    /// Puts a pair at the head of the lists of its two bodies.
+    /// Inserts a pair at the head of the lists of its two bodies.
     #[inline]
     pub(super) fn link(&mut self, slot: PairSlot, key: PairKey) {
         if !self.is_kept {
@@ -128,7 +127,7 @@ impl Lists {
         }
     }
 
-    /// Takes a pair out of the lists of its two bodies.
+    /// Removes a pair from the lists of its two bodies.
     #[inline]
     pub(super) fn unlink(&mut self, slot: PairSlot, key: PairKey) {
         if !self.is_kept {
@@ -160,7 +159,7 @@ impl Lists {
         })
     }
 
-    /// Asks for what a pair that is to be taken out will touch to be brought near.
+    /// Prefetches what the removal of a pair will touch.
     #[inline]
     pub(super) fn prefetch_unlink(&self, slot: PairSlot, key: PairKey) {
         self.prefetch_heads(key);
@@ -171,7 +170,7 @@ impl Lists {
         }
     }
 
-    /// Asks for the heads of the lists of a pair's bodies to be brought near.
+    /// Prefetches the list heads of a pair's bodies.
     #[inline]
     pub(super) fn prefetch_heads(&self, key: PairKey) {
         let (low, high) = key.slots();
@@ -180,7 +179,7 @@ impl Lists {
         }
     }
 
-    /// Asks for the first places of the lists of a pair's bodies to be brought near.
+    /// Prefetches the first nodes of the lists of a pair's bodies.
     #[inline]
     pub(super) fn prefetch_seconds(&self, key: PairKey) {
         let (low, high) = key.slots();
@@ -190,7 +189,7 @@ impl Lists {
         }
     }
 
-    /// Asks for the place of a slot to be brought near.
+    /// Prefetches the nodes of a slot.
     #[inline]
     pub(super) fn prefetch_slot(&self, slot: PairSlot) {
         self.prefetch_half(2 * slot.0);
@@ -203,10 +202,10 @@ impl Lists {
         }
     }
 
-    /// Checks the links both ways, and that each pair stands in two lists.
+    /// Checks the links both ways, and that each pair is in two lists.
     ///
     /// * `key_at` - the pair in a slot.
-    /// * `pairs` - how many there are.
+    /// * `pairs` - number of pairs.
     pub(super) fn validate(
         &self,
         key_at: impl Fn(PairSlot) -> Option<PairKey>,

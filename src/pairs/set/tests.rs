@@ -1,4 +1,4 @@
-//! The set against a plain list of its pairs, whatever comes, goes and is asked.
+//! Compares the set with a plain list of its pairs, for any sequence of operations.
 
 use super::*;
 
@@ -50,7 +50,7 @@ fn a_full_set_takes_no_pair_and_marks_both_bodies() {
     set.validate().unwrap();
 }
 
-/// Lists are kept from when they are asked for until more pairs have come and gone than there are.
+/// Lists are kept from the first lookup until more pairs have come and gone than there are.
 #[test]
 fn the_pairs_of_a_body_are_the_same_whether_lists_are_kept_or_not() {
     let mut set = PairSet::new(100);
@@ -78,7 +78,7 @@ fn the_pairs_of_a_body_are_the_same_whether_lists_are_kept_or_not() {
             .collect();
         keys.sort_unstable();
         keys.dedup();
-        // What has an even body stays, and what has a body of three begins.
+        // Pairs whose lower body is even stay; pairs whose higher body is a multiple of three do not begin.
         let goes = |key: PairKey| key.slots().0.0 % 2 == 1;
         let begins = |key: PairKey| !key.slots().1.0.is_multiple_of(3);
         let mut ended = Vec::new();

@@ -6,7 +6,7 @@ impl PairSet {
     /// Checks the whole structure: links both ways, counts, free slots, marks.
     ///
     /// # Errors
-    /// One sentence on the first thing that does not hold.
+    /// One sentence on the first check that fails.
     pub fn validate(&self) -> Result<(), String> {
         let live = self.iter().count();
         if live != self.len || self.len > self.limit {

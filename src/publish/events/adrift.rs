@@ -1,8 +1,8 @@
-//! Histories whose slots were lost, because the pair set was built anew, until their pairs are found again.
+//! Histories whose slots were lost because the pair set was rebuilt, until their pairs are found again.
 //!
-//! In: the pair set as it is now, what left the world in this tick. Out: a history at its pair's new slot, or an end
-//! with its cause. Of a pair that is not there because nothing is known of it (a place is unknown, the set is full)
-//! nothing is told until something is.
+//! In: the new pair set, bodies that left the world in this tick. Out: a history at its pair's new slot, or an end with
+//! its cause. For a pair that is absent because nothing is known about it (a place is unknown, the set is full) nothing
+//! is reported until something is known.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use crate::world::World;
 #[derive(Debug)]
 pub(super) struct Adrift {
     history: History,
-    /// Its bodies when that was; `None`: one was gone by then.
+    /// Its bodies at that time; `None`: one was gone by then.
     key: Option<PairKey>,
 }
 
@@ -26,7 +26,7 @@ impl Adrift {
         &self.history
     }
 
-    /// Why its pair is not there any more; `None`: that is not known.
+    /// Why its pair is gone; `None`: unknown.
     fn cause(
         &self,
         removed: &BTreeMap<BodySlot, EndCause>,
@@ -56,7 +56,7 @@ impl Adrift {
 impl Events {
     /// The slots of all pairs are void.
     ///
-    /// * `last` - the last tick in which they were not.
+    /// * `last` - the last tick in which they were valid.
     pub(in crate::publish) fn forget_slots(&mut self, last: u64, world: &World) {
         for mut history in self.histories.drain(..) {
             if history.born != 0 {
@@ -68,8 +68,8 @@ impl Events {
         }
     }
 
-    /// Gives the histories whose slots were lost to the same pairs' new slots; where there is no such pair any more,
-    /// its collision has ended.
+    /// Moves histories whose slots were lost to the new slots of the same pairs; if there is no such pair any more, its
+    /// collision has ended.
     pub(in crate::publish) fn find_slots(
         &mut self,
         tick: u64,
@@ -85,7 +85,7 @@ impl Events {
         let is_same = |slot: &BodySlot| !removed.contains_key(slot);
         for lost in std::mem::take(&mut self.adrift) {
             let history = lost.history;
-            // What stands in the place of a body that left in this tick is another.
+            // The slot of a body that left in this tick now holds another body.
             let key = lost.key.filter(|key| {
                 let (low, high) = key.slots();
                 is_same(&low) && is_same(&high)

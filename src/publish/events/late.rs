@@ -1,9 +1,8 @@
-//! What was certified of a tick's poses after its messages had gone out.
+//! Results certified for a tick's poses after its messages were sent.
 //!
-//! In: pairs that were decided in what was left of a tick's budget. Out: their histories say so, and an end or a begin
-//! waits for the next tick's messages, with a range that ends at the tick whose poses it was certified at. Where bodies
-//! move on, the next tick may find nothing of it: without this an end and the begin after it were one collision that
-//! persists.
+//! In: pairs decided in the rest of a tick's budget. Out: their histories record it, and an end or a begin waits for
+//! the next tick's messages, with a range that ends at the tick whose poses were tested. Bodies move on, so the next
+//! tick may not find it: without this an end followed by a begin would look like one collision that persists.
 
 use super::{Events, Ids, Ticks};
 use crate::ids::PairSlot;
@@ -11,7 +10,7 @@ use crate::narrow::Finding;
 use crate::wire::{EndCause, Verdict};
 
 impl Events {
-    /// Takes the verdict of a pair at the poses of a tick that [`Events::certify`] had none of; then comes
+    /// Takes the verdict of a pair at the poses of a tick for which [`Events::certify`] had none; must be followed by
     /// [`Events::merge`].
     pub(in crate::publish) fn certify_late(
         &mut self,
@@ -23,7 +22,7 @@ impl Events {
         let Some(history) = self.histories.get_mut(slot.index()) else {
             return;
         };
-        // Of a pair that the tick did not look at nothing was left open.
+        // For a pair that the tick did not review nothing was left open.
         if history.active != tick || history.ids != ids {
             return;
         }
@@ -32,7 +31,7 @@ impl Events {
             Verdict::Near | Verdict::Apart => false,
             Verdict::Possible | Verdict::None => return,
         };
-        // After a touch on the way it may have ended in that very tick.
+        // After a touch during the motion it may have ended in that very tick.
         let first = if history.tick == 0 {
             history.born
         } else {

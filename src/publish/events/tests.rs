@@ -1,4 +1,4 @@
-//! Goal: events that were never sent are one entry a pair, which says all that is still true. Method: they happen, and
+//! Goal: events that were never sent are one entry per pair, with all that is still true. Method: events happen, and
 //! are merged.
 
 use super::*;

@@ -1,4 +1,4 @@
-//! Checks the histories of all pairs, and the events that wait.
+//! Checks the histories of all pairs, and the waiting events.
 
 use super::{Events, History};
 use crate::ids::{PairKey, PairSlot};
@@ -8,11 +8,11 @@ use crate::wire::Verdict;
 use crate::world::World;
 
 impl Events {
-    /// Structure check: one waiting entry a pair, by ids, of what has happened by `tick`; histories of the pairs that
-    /// there are, which say what is known of them.
+    /// Structure check: one waiting entry per pair, by ids, of events up to `tick`; histories of existing pairs only,
+    /// which agree with the findings.
     ///
     /// # Errors
-    /// One sentence on the first thing that does not hold.
+    /// One sentence on the first check that fails.
     pub(in crate::publish) fn validate(
         &self,
         tick: u64,
@@ -23,7 +23,7 @@ impl Events {
         self.validate_waiting(tick)?;
         for (at, history) in (0..).zip(&self.histories) {
             if history.born == 0 {
-                // Of a pair that nothing was said of.
+                // A pair that was never reported.
                 if history.colliding || history.verdict != Verdict::None {
                     return Err(format!("{:?} has no history and a verdict", history.ids));
                 }
@@ -51,7 +51,7 @@ impl Events {
         Ok(())
     }
 
-    /// Events that found no room.
+    /// Checks the events that did not fit.
     fn validate_waiting(&self, tick: u64) -> Result<(), String> {
         let waiting = &self.waiting;
         if !waiting.is_sorted_by(|one, next| one.ids < next.ids) {
@@ -75,7 +75,7 @@ impl Events {
 }
 
 impl History {
-    /// What is certified of a pair that nothing happened to since is what is known of it.
+    /// For a pair without changes since, the certified result must equal the finding.
     fn validate(&self, slot: PairSlot, narrow: &Narrow) -> Result<(), String> {
         let Some(finding) = narrow.finding(slot).filter(|_| !narrow.is_stirred(slot)) else {
             return Ok(());
@@ -102,10 +102,10 @@ mod tests {
     use super::*;
     use crate::publish::validate::tests::Stage;
 
-    /// What is broken, and what is told of it; `tick` is 1.
+    /// A fault, and the expected message; `tick` is 1.
     type Fault = (&'static str, fn(&mut Events));
 
-    /// The first history of a pair that something was said of.
+    /// The first history of a pair that was reported.
     fn first(events: &mut Events) -> &mut History {
         events
             .histories
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn what_is_broken_in_the_events_is_found() {
         for (told, fault) in FAULTS {
-            // Most begins find no room.
+            // Most begins do not fit.
             let mut stage = Stage::new(2);
             let (events, world) = (&mut stage.publisher.events, &stage.world);
             assert!(events.waiting.len() > 2);

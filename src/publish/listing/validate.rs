@@ -4,11 +4,11 @@ use super::{Listing, NO_ROW, Row};
 use crate::ids::PairSlot;
 
 impl Listing {
-    /// Structure check: marks by ids, each with a row of its own that says what the mark does, all other rows free, and
-    /// flags that say which pairs have one.
+    /// Structure check: marks by ids, each with its own row that agrees with it, all other rows free, and flags that
+    /// show which pairs have one.
     ///
     /// # Errors
-    /// One sentence on the first thing that does not hold.
+    /// One sentence on the first check that fails.
     pub(in crate::publish) fn validate(&self) -> Result<(), String> {
         if !self.late.is_empty() || self.dropped {
             return Err("rows of the list wait for their places".into());
@@ -60,7 +60,7 @@ impl Listing {
         Ok(())
     }
 
-    /// Whether every active pair is told to have a row, but those that became so later.
+    /// Returns whether every active pair counts as having a row, except those that became active later.
     pub(in crate::publish) fn is_complete(&self) -> bool {
         self.complete
     }
@@ -74,7 +74,7 @@ mod tests {
     use crate::math::Interval;
     use crate::wire::Verdict;
 
-    /// Three rows, of which the second was dropped.
+    /// Three rows; the second was dropped.
     fn listing() -> Listing {
         let mut listing = Listing::default();
         for id in [1, 2, 3, 4] {
@@ -94,7 +94,7 @@ mod tests {
         listing
     }
 
-    /// What is broken, and what is told of it.
+    /// A fault, and the expected message.
     type Fault = (&'static str, fn(&mut Listing));
 
     const FAULTS: [Fault; 9] = [

@@ -1,5 +1,5 @@
-//! Goal: what is broken in the publisher is found. Method: a tick of bodies at rest that touch and are near is
-//! published, and one thing after the other is broken in a publisher, or in messages, of its own.
+//! Goal: faults in the publisher are found. Method: a tick of bodies at rest that touch and are near is published; then
+//! faults are made one by one, each in its own publisher or messages.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use crate::time::{ManualClock, Meter};
 use crate::wire::{Demand, Outbox, Verdict};
 use crate::world::World;
 
-/// A row of balls, each in the next and near the one behind it, after its first tick.
+/// A row of balls, each overlapping the next and near the one after that, after its first tick.
 pub(in crate::publish) struct Stage {
     pub(in crate::publish) world: World,
     pub(in crate::publish) pairs: PairSet,
@@ -27,7 +27,7 @@ pub(in crate::publish) struct Stage {
 }
 
 impl Stage {
-    /// * `pair_rows` - that fit into a message.
+    /// * `pair_rows` - rows that fit into a message.
     pub(in crate::publish) fn new(pair_rows: usize) -> Self {
         let bodies = (0..8).map(|at| {
             let shape = "{ type = \"sphere\", radius = 1.0 }";
@@ -97,12 +97,12 @@ impl Stage {
     }
 }
 
-/// What is broken, and what is told of it.
+/// A fault, and the expected message.
 type Fault = (&'static str, fn(&mut Stage));
 
 const FAULTS: [Fault; 12] = [
     ("known is", |stage| {
-        // One that says near of a pair that collides.
+        // A row that says near for a pair that collides.
         let listing = &mut stage.publisher.listing;
         let at = listing
             .iter()

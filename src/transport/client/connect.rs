@@ -1,4 +1,4 @@
-//! Finding a daemon and making sure that both sides speak the same.
+//! Finding a daemon and checking that both sides use the same version.
 
 use std::io::Read;
 
@@ -23,7 +23,7 @@ pub struct ClientOptions {
 }
 
 impl ClientOptions {
-    /// Opens the daemon's services, again and again until it is there, and waits for its hello.
+    /// Opens the daemon's services, retrying until it is there, and waits for its hello.
     ///
     /// # Errors
     /// `Error::Usage` when the source's name is empty or longer than 31 bytes; `Error::TimedOut` without a daemon in
@@ -40,7 +40,7 @@ impl ClientOptions {
     }
 }
 
-/// A source's name goes into a field of each frame, with a zero behind it.
+/// A source's name goes into a field of each frame, with a zero after it.
 pub(super) fn check_source(name: Option<&str>) -> Result<()> {
     match name {
         Some(name) if !(1..SOURCE_NAME_LEN).contains(&name.len()) => Err(Error::Usage(format!(
@@ -94,7 +94,7 @@ impl Client {
         .connect()
     }
 
-    /// Waits for the hello and checks it; for some time in any case, for the daemon has to see who came.
+    /// Waits for the hello and checks it; waits some time in any case, since the daemon has to notice the new client.
     pub(super) fn greet(&mut self, timeout_ns: u64) -> Result<()> {
         let until_ns = (self.clock.monotonic_ns()).saturating_add(timeout_ns.max(GREET_NS));
         loop {
@@ -117,7 +117,7 @@ impl Client {
     }
 }
 
-/// Both versions, when they differ in a way that matters.
+/// Checks both versions; an error shows both if they differ in a way that matters.
 pub(crate) fn check_hello(hello: &Hello) -> Result<()> {
     let text = |bytes: &[u8]| name_str(bytes).unwrap_or("?").to_owned();
     let (theirs, iceoryx2) = (text(&hello.sweepd_version), text(&hello.iceoryx2_version));

@@ -1,4 +1,4 @@
-//! Following the ticks: each message is put with the tick it belongs to; what is older than the newest is dropped.
+//! Following the ticks: each message is matched with its tick; messages older than the newest tick are dropped.
 
 use super::link::Link;
 use super::list::{ContactList, PairList};
@@ -8,8 +8,8 @@ use crate::wire::{
     BodyRow, ContactRow, MessageHeader, NameRow, PairRow, Reason, RegionRow, State, TickRow,
 };
 
-/// Ticks of the boot in force that may still come while a message of the next one is there: what a queue holds, twice.
-/// A message that waits for its tick for longer is of a boot that came and went unseen.
+/// Ticks of the current boot that may still come while a message of the next one is there: twice the length of a queue.
+/// A message that waits longer for its tick is from a boot that came and went unseen.
 const TICKS_LEFT_MAX: u32 = 16;
 
 /// A message as it was received.
@@ -27,7 +27,7 @@ impl<T> Message<T> {
     }
 }
 
-/// The newest tick and what belongs to it.
+/// The newest tick and its messages.
 #[derive(Clone, Debug, Default)]
 pub struct View {
     tick: TickRow,
@@ -49,23 +49,23 @@ impl View {
         &self.tick
     }
 
-    /// Whether the tick is still under way, and longer than a heartbeat: nothing belongs to it yet, and it is the
-    /// result of no frame. What was sent with its end is read with its end, however late one looks.
+    /// Returns whether the tick is still in progress, for longer than a heartbeat: it has no messages yet, and is the
+    /// result of no frame. Messages sent with its end are read with its end, however late the client reads.
     #[must_use]
     pub fn is_under_way(&self) -> bool {
-        // No tick that has ended says so: undecided pairs alone are no reason for `unknown`.
+        // No finished tick looks like this: undecided pairs alone are no reason for `unknown`.
         self.tick.header.state == State::Unknown.code()
             && self.tick.reasons == Reason::Undecided.bit()
     }
 
-    /// The pairs of this very tick; `None`: not listened to when it began, or overtaken in the queue.
+    /// The pairs of this very tick; `None`: not subscribed when it began, or overwritten in the queue.
     #[must_use]
     pub fn pairs(&self) -> Option<&Message<PairRow>> {
         self.pairs.of(&self.tick.header)
     }
 
-    /// The list of pairs at this very tick, kept from `changes`; `None`: not listened to when it began, or not whole
-    /// (yet, or again: the daemon was asked for all of it).
+    /// The list of pairs at this very tick, built from `changes`; `None`: not subscribed when it began, or incomplete
+    /// (yet, or again: the whole list was requested from the daemon).
     #[must_use]
     pub fn list(&self) -> Option<&PairList> {
         self.list.of(&self.tick.header)
@@ -77,7 +77,7 @@ impl View {
         self.contacts.of(&self.tick.header)
     }
 
-    /// The contacts at this very tick, kept from `contact_changes`; `None` as for [`View::list`].
+    /// The contacts at this very tick, built from `contact_changes`; `None` as for [`View::list`].
     #[must_use]
     pub fn contact_list(&self) -> Option<&ContactList> {
         self.contact_list.of(&self.tick.header)
@@ -95,7 +95,7 @@ impl View {
         self.bodies.of(&self.tick.header)
     }
 
-    /// One `Verdict` a body of this very tick, in the order of the names; `None` as for [`View::pairs`].
+    /// One `Verdict` per body of this very tick, in the order of the names; `None` as for [`View::pairs`].
     #[must_use]
     pub fn body_verdicts(&self) -> Option<&Message<u8>> {
         self.body_verdicts.of(&self.tick.header)
@@ -114,7 +114,7 @@ impl View {
     }
 }
 
-/// The message in force, and one that came early.
+/// The current message, and one that came early.
 #[derive(Clone, Debug, Default)]
 struct Stream<T> {
     now: Message<T>,
@@ -128,7 +128,7 @@ struct Stream<T> {
 pub(super) struct Wait(u32);
 
 impl Wait {
-    /// It is of another boot than the tick that has come: whether it waits in vain.
+    /// The message has another boot id than the tick that came; returns whether it waits in vain.
     pub(super) fn is_in_vain(&mut self, boot_id: u64, boots_over: &mut Vec<u64>) -> bool {
         self.0 += 1;
         let in_vain = self.0 > TICKS_LEFT_MAX;
@@ -139,7 +139,7 @@ impl Wait {
         in_vain
     }
 
-    /// Another message is there.
+    /// Another message came.
     pub(super) fn begin(&mut self) {
         self.0 = 0;
     }
@@ -162,7 +162,7 @@ impl<T> Stream<T> {
         (tick.boot_id != 0 && self.now.header.boot_id == tick.boot_id).then_some(&self.now)
     }
 
-    /// Takes messages up to the tick; one of a later tick or boot is kept for then.
+    /// Takes messages up to the tick; one of a later tick or boot is kept for later.
     fn advance(
         &mut self,
         tick: &MessageHeader,
@@ -200,12 +200,12 @@ impl<T> Stream<T> {
 pub(super) struct Follow {
     pub(super) view: View,
     boots_over: Vec<u64>,
-    /// First tick of a new boot, held back until the restart was told.
+    /// First tick of a new boot, held back until the restart was reported.
     held: Option<TickRow>,
 }
 
 impl Follow {
-    /// The next newer tick with all that belongs to it, or the news of a restart.
+    /// The next newer tick with all its messages, or the report of a restart.
     pub(super) fn next(&mut self, link: &mut dyn Link) -> Result<Heard> {
         loop {
             let tick = match self.held.take() {
@@ -216,19 +216,19 @@ impl Follow {
                 },
             };
             let (old, new) = (self.view.tick.header, tick.header);
-            // queues of an old and a new daemon are read in no certain order
+            // The queues of an old and a new daemon are read in no fixed order.
             if self.boots_over.contains(&new.boot_id) {
                 continue;
             }
             if old.boot_id != 0 && old.boot_id != new.boot_id {
-                // There is one daemon at a time: what is left of one that came and went unseen is older.
+                // There is one daemon at a time: leftovers of one that came and went unseen are older.
                 if tick.sent_ns < self.view.tick.sent_ns {
                     note_over(&mut self.boots_over, new.boot_id);
                     continue;
                 }
                 return Ok(Heard::Restarted(self.restart(tick)));
             }
-            // A tick that takes longer than a heartbeat is told of under its own number before it is there itself.
+            // A tick that takes longer than a heartbeat is announced under its own number before it is finished.
             let (seen, next) = (&self.view.tick, &tick);
             if (next.header.tick, next.sent_ns) <= (seen.header.tick, seen.sent_ns) {
                 continue;
@@ -259,12 +259,13 @@ impl Follow {
         }
     }
 
-    /// What belongs to the tick was sent before it, so it is already there.
+    /// The messages of a tick were sent before it, so they are already there.
     fn gather(&mut self, link: &mut dyn Link, tick: &MessageHeader) -> Result<()> {
         let (view, over) = (&mut self.view, &mut self.boots_over);
         view.names.advance(tick, over, |m| link.names(m))?;
         view.plan.advance(tick, over, |m| link.plan(m))?;
-        // Who looks late finds the rows of its end beside what was told of it before; they are handed out once.
+        // A late reader finds the rows of the tick's end together with its earlier announcement; they are returned
+        // once.
         if view.is_under_way() {
             return Ok(());
         }

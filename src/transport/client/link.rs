@@ -1,4 +1,4 @@
-//! What a client needs of a transport: one implementation for shared memory, one for memory of this process.
+//! What a client needs from a transport: one implementation for shared memory, one for memory within the process.
 
 use std::fmt::Debug;
 
@@ -9,7 +9,7 @@ use crate::wire::{
     RegionRow, RequestHeader, TickRow, TransformRow, TransformVelRow, VertexHeader, VertexRow,
 };
 
-/// What to listen to beside ticks.
+/// Messages to subscribe to in addition to ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(
     clippy::struct_excessive_bools,
@@ -60,7 +60,7 @@ pub enum Rows<'a> {
     Moving(&'a [TransformVelRow]),
 }
 
-/// A client's ports. Reads never wait: `None` or `false` means that nothing newer is there.
+/// A client's ports. Reads never wait: `None` or `false` means that there is nothing newer.
 ///
 /// Every method fails with `Error::Io` when its port does.
 pub trait Link: Debug {
@@ -69,12 +69,12 @@ pub trait Link: Debug {
     /// # Errors
     /// `Error::Io`.
     fn subscribe(&mut self, topics: Topics) -> Result<()>;
-    /// Hands a frame over and wakes the daemon.
+    /// Sends a frame and wakes the daemon.
     ///
     /// # Errors
     /// `Error::Io`.
     fn send(&mut self, header: &FrameHeader, rows: Rows<'_>) -> Result<()>;
-    /// Hands vertices of one body over, ahead of the frame that they belong with.
+    /// Sends vertices of one body, ahead of the frame that they belong to.
     ///
     /// # Errors
     /// `Error::Io`.
@@ -99,7 +99,7 @@ pub trait Link: Debug {
     /// # Errors
     /// `Error::Io`.
     fn changes(&mut self, into: &mut Message<PairRow, ChangesHeader>) -> Result<bool>;
-    /// Opens the port of `changes` anew: what waits in it is gone, and the daemon sends the whole list next.
+    /// Opens the port of `changes` again: messages in it are lost, and the daemon sends the whole list next.
     ///
     /// # Errors
     /// `Error::Io`.
@@ -109,7 +109,7 @@ pub trait Link: Debug {
     /// # Errors
     /// `Error::Io`.
     fn contact_changes(&mut self, into: &mut Message<ContactRow, ChangesHeader>) -> Result<bool>;
-    /// As [`Link::renew_changes`], of `contact_changes`.
+    /// As [`Link::renew_changes`], for `contact_changes`.
     ///
     /// # Errors
     /// `Error::Io`.

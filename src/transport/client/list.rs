@@ -1,8 +1,8 @@
-//! The lists of pairs and of contacts, kept from `changes` and `contact_changes`: each message is applied in its order,
-//! none to a list that it is not for.
+//! The lists of pairs and of contacts, built from `changes` and `contact_changes`: messages are applied in order, and
+//! each only to the list that it builds on.
 //!
-//! A reader that has missed a message holds a list that is not whole. It does not show it, opens its port anew, and has
-//! the whole list with the daemon's next tick.
+//! A reader that has missed a message has an incomplete list. It hides that list, opens its port again, and gets the
+//! whole list with the daemon's next tick.
 
 mod rows;
 
@@ -13,20 +13,20 @@ use crate::wire::{ChangesHeader, ContactRow, MessageHeader, PairRow};
 
 use rows::{Contacts, Pairs, Rows};
 
-/// Messages that are passed over while the whole list is awaited, before the port is opened anew: the daemon sends it
-/// with the first or second tick.
+/// Messages skipped while the whole list is awaited, before the port is opened again: the daemon sends it with the
+/// first or second tick.
 const PATIENCE: u32 = 8;
 
-/// The rows of `pairs`, as `changes` make them: by ids, with the ages of the tick.
+/// The rows of `pairs`, as built from `changes`: by ids, with the ages of the tick.
 pub type PairList = List<Pairs>;
 
-/// The rows of `contacts`, as `contact_changes` make them.
+/// The rows of `contacts`, as built from `contact_changes`.
 pub type ContactList = List<Contacts>;
 
-/// A list that is kept from messages of what is new.
+/// A list that is built from messages with changes.
 #[derive(Clone, Debug, Default)]
 pub struct List<R: Rows> {
-    /// The newest that was taken.
+    /// The newest message taken.
     news: Message<R::Row, ChangesHeader>,
     /// One that came early.
     ahead: Message<R::Row, ChangesHeader>,
@@ -34,7 +34,7 @@ pub struct List<R: Rows> {
     wait: Wait,
     rows: R,
     is_whole: bool,
-    /// Messages passed over since the whole list was last asked for.
+    /// Messages skipped since the whole list was last requested.
     passed: u32,
 }
 
@@ -52,7 +52,7 @@ impl PairList {
 }
 
 impl ContactList {
-    /// The contacts of a pair, the smaller id first; of one that has none an empty slice.
+    /// The contacts of a pair, the smaller id first; an empty slice if it has none.
     #[must_use]
     pub fn get(&self, body_a: u64, body_b: u64) -> &[ContactRow] {
         self.rows.get((body_a, body_b))
@@ -65,20 +65,20 @@ impl ContactList {
 }
 
 impl<R: Rows> List<R> {
-    /// What the tick said: of pairs the rows that changed, of contacts those of the pairs of which there was something
-    /// new; under `base_tick` 0 the whole list.
+    /// The message of the tick: changed rows of pairs, or the contacts of pairs with news; with `base_tick` 0 the whole
+    /// list.
     #[must_use]
     pub fn changes(&self) -> &Message<R::Row, ChangesHeader> {
         &self.news
     }
 
-    /// How many rows it has.
+    /// Number of rows.
     #[must_use]
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// Whether it has none.
+    /// Returns whether there are no rows.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -92,13 +92,13 @@ impl<R: Rows> List<R> {
         self.news.header.message.tick
     }
 
-    /// The list, where it is whole and of this tick.
+    /// The list, if it is complete and belongs to this tick.
     pub(super) fn of(&self, tick: &MessageHeader) -> Option<&Self> {
         let is_of = self.boot_id() == tick.boot_id && self.tick() == tick.tick;
         (self.is_whole && is_of).then_some(self)
     }
 
-    /// Takes messages up to the tick; one of a later tick or boot is kept for then.
+    /// Takes messages up to the tick; one of a later tick or boot is kept for later.
     pub(super) fn advance(
         &mut self,
         tick: &MessageHeader,
@@ -129,7 +129,7 @@ impl<R: Rows> List<R> {
         }
     }
 
-    /// Applies the message that came; returns whether the whole list is to be asked for.
+    /// Applies the message that came; returns whether to request the whole list.
     fn take(&mut self) -> bool {
         let (header, had) = (self.ahead.header, self.is_whole);
         let (boot_id, tick) = (header.message.boot_id, header.message.tick);
@@ -141,7 +141,7 @@ impl<R: Rows> List<R> {
         if self.is_whole {
             self.rows.take(tick, &self.ahead.rows);
         }
-        // What the sender says of its list is checked, so that a fault of either side is found and mended.
+        // The length stated by the sender is checked, so that a fault of either side is detected and repaired.
         self.is_whole = self.is_whole && self.rows.len() as u64 == header.listed;
         if self.is_whole {
             std::mem::swap(&mut self.news, &mut self.ahead);
@@ -172,7 +172,7 @@ mod tests {
         }
     }
 
-    /// A message of a tick; returns whether the whole list is asked for.
+    /// Applies a message of a tick; returns whether the whole list is requested.
     fn hear(list: &mut PairList, tick: u64, base_tick: u64, rows: &[PairRow], listed: u64) -> bool {
         let message = MessageHeader {
             boot_id: 7,
@@ -233,7 +233,7 @@ mod tests {
             };
             assert!(asked);
             assert_eq!((ids(&list, 6), ids(&list, 7)), (None, None));
-            // The daemon needs a tick or two; it is not asked in each.
+            // The daemon needs a tick or two; the request is not repeated in each.
             let again: Vec<_> = (8..8 + u64::from(PATIENCE))
                 .map(|tick| hear(&mut list, tick, tick - 1, &[], 1))
                 .collect();

@@ -1,7 +1,7 @@
 //! The client's side of a door: frames and requests out, results in. Used by `feed`, `monitor`, `list` and live
 //! queries, and by any Rust program that streams poses.
 //!
-//! A client never reconnects by hand: its services outlive the daemon, and the boot id tells a restart.
+//! A client never reconnects by hand: its services outlive the daemon, and the boot id reveals a restart.
 
 mod connect;
 mod follow;
@@ -29,32 +29,32 @@ use crate::wire::{
     frame_flags, name_bytes, pair_flags,
 };
 
-/// Longest sleep between two looks at the ports: where an event got lost, nothing waits longer than this.
+/// Longest sleep before the ports are checked again: if an event was lost, nothing waits longer than this.
 const LOOK_AGAIN_NS: u64 = 50_000_000;
-/// Ticks that one look at what is there takes at most: more than its queues hold, so that the newest at its begin is
-/// among them. Where what belongs to a tick takes longer to read than the next tick takes to come, there is always one.
+/// Most ticks read by one check: more than its queues hold, so that the newest one at its start is among them. If
+/// reading a tick's messages takes longer than the next tick takes to come, there is always another one.
 const LATEST_MAX: usize = 32;
-/// Boots remembered as over, so that what is left of them in a queue is known to be old.
+/// Number of finished boots remembered, so that their messages left in a queue are recognized as old.
 const BOOTS_OVER_MAX: usize = 16;
 
-/// What a client says about a frame beside its rows; zeros say nothing.
+/// What a client states about a frame in addition to its rows; zero means not given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameInfo {
     /// The sender's own stamp of the poses, nanoseconds of the clock `clock_id`.
     pub stamp_ns: u64,
     /// The sender's number for that clock.
     pub clock_id: u32,
-    /// Least scene revision the poses need; 0: any.
+    /// Least scene revision that the poses need; 0: any.
     pub scene_rev: u64,
     /// Deadline of the tick, nanoseconds of `CLOCK_MONOTONIC`; 0: none.
     pub deadline_ns: u64,
-    /// Time left for the tick from receipt, nanoseconds; 0: not said.
+    /// Time left for the tick from receipt, nanoseconds; 0: not given.
     pub time_left_ns: u64,
-    /// Whether the rows are some bodies of the source only.
+    /// Whether the rows are only some bodies of the source.
     pub partial: bool,
 }
 
-/// Which frame: order within a session is `(epoch, seq)`.
+/// Identity of a frame: order within a session is `(epoch, seq)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct FrameId {
     /// The client's session.
@@ -65,18 +65,18 @@ pub struct FrameId {
     pub seq: u64,
 }
 
-/// The daemon restarted: everything it said before has ended.
+/// The daemon restarted: everything it reported before has ended.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Restarted {
     /// Boot id before.
     pub old_boot: u64,
     /// Boot id now.
     pub new_boot: u64,
-    /// An end (`EndCause::Restart`) for each pair that was certified colliding when last heard of.
+    /// An end (`EndCause::Restart`) for each pair whose last certified verdict was colliding.
     pub ends: Vec<PairRow>,
 }
 
-/// What a wait brought.
+/// Result of a wait.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Heard {
     /// A newer tick: see [`Client::view`].
@@ -96,7 +96,7 @@ pub struct Client {
     frame: FrameId,
     /// Version of the last vertices sent, by body.
     versions: BTreeMap<u64, u64>,
-    /// Messages of vertices sent in this session.
+    /// Number of vertex messages sent in this session.
     bent: u64,
     requests: u64,
     follow: follow::Follow,
@@ -146,20 +146,20 @@ impl Client {
         Ok(client)
     }
 
-    /// How long a wait looks for the next tick before it sleeps, nanoseconds; `u64::MAX`: it never sleeps. Over
-    /// shared memory 50 us where there is more than one core, else 0. Finding takes 0.5 us, waking from a sleep 10 to
-    /// 25 us.
+    /// Sets how long a wait spins for the next tick before it sleeps, nanoseconds; `u64::MAX`: it never sleeps. Over
+    /// shared memory 50 us if there is more than one core, else 0. Spinning finds a tick in 0.5 us, waking from a sleep
+    /// takes 10 to 25 us.
     pub fn set_spin_ns(&mut self, spin_ns: u64) {
         self.patience = Patience::new(spin_ns);
     }
 
-    /// What the daemon said of itself at the connection.
+    /// The daemon's hello at the connection.
     #[must_use]
     pub fn hello(&self) -> &Hello {
         &self.hello
     }
 
-    /// This client's session, drawn at its start.
+    /// This client's session, a random number from its start.
     #[must_use]
     pub fn session(&self) -> u64 {
         self.frame.session
@@ -171,7 +171,7 @@ impl Client {
         &self.follow.view
     }
 
-    /// Listens to these messages from now on, as well as to ticks. The daemon computes what somebody listens to.
+    /// Subscribes to these messages, in addition to ticks. The daemon computes only what has readers.
     ///
     /// # Errors
     /// `Error::Io` when a port cannot be opened.
@@ -182,7 +182,7 @@ impl Client {
     /// Sends a frame of the source's bodies; full unless `info.partial`.
     ///
     /// # Errors
-    /// `Error::Usage` when the client was opened without a source, `Error::Io` when it cannot be handed over.
+    /// `Error::Usage` when the client was opened without a source, `Error::Io` when it cannot be sent.
     pub fn send(&mut self, info: &FrameInfo, rows: Rows<'_>) -> Result<FrameId> {
         let flags = if info.partial {
             frame_flags::PARTIAL
@@ -203,11 +203,11 @@ impl Client {
     /// Begins a new epoch: the world was reset, every pair of the source's bodies ends with the next frame.
     pub fn reset_epoch(&mut self) {
         self.frame.epoch += 1;
-        // What the daemon had of vertices is void with it.
+        // The daemon discards its vertices too.
         self.versions.clear();
     }
 
-    /// Low half of the boot id of the last tick taken, whose ids the caller knows; 0: of none.
+    /// Low half of the boot id of the last tick taken, whose ids the caller knows; 0: none.
     #[allow(clippy::cast_possible_truncation, reason = "the low half is meant")]
     fn boot(&self) -> u32 {
         self.follow.view.tick().header.boot_id as u32
@@ -236,13 +236,13 @@ impl Client {
             schema: WIRE_VERSION,
             boot: self.boot(),
         };
-        // Counted first: where the link fails once the frame is out, its number must never be another frame's.
+        // Counted first: if the link fails after the frame was sent, its number must never be reused.
         self.frame = id;
         self.link.send(&header, rows)?;
         Ok(id)
     }
 
-    /// Waits for the next newer tick and everything that belongs to it.
+    /// Waits for the next newer tick and all messages of it.
     ///
     /// # Errors
     /// `Error::Io` when a port fails.
@@ -284,7 +284,7 @@ impl Client {
         Ok(heard)
     }
 
-    /// Takes what is there without waiting, up to the newest tick.
+    /// Takes what has arrived without waiting, up to the newest tick.
     ///
     /// # Errors
     /// As [`Client::wait_tick`].
@@ -300,10 +300,10 @@ impl Client {
         Ok(newest)
     }
 
-    /// Asks the daemon and waits for its answer.
+    /// Sends a request to the daemon and waits for its answer.
     ///
-    /// * `json` - edits or a question, as `msgs/README.md` has them.
-    /// * `blobs` - vertex and index bytes the JSON names by offset from the first of them, little-endian.
+    /// * `json` - edits or a query, as described in `msgs/README.md`.
+    /// * `blobs` - vertex and index bytes that the JSON refers to by offset from the first of them, little-endian.
     /// * returns - the answer; `ok = false` when the daemon refused.
     ///
     /// # Errors
@@ -314,7 +314,7 @@ impl Client {
             .map_err(|e| Error::io(format!("the daemon's answer is no answer: {text}"), e))
     }
 
-    /// As [`Client::request`], the answer's JSON as it came.
+    /// As [`Client::request`], but returns the answer's JSON unparsed.
     ///
     /// # Errors
     /// As [`Client::request`].
@@ -328,7 +328,7 @@ impl Client {
         })
     }
 
-    /// Sends a request as [`Client::request`] does, and does not wait: [`Client::answer_text`] does.
+    /// Sends a request as [`Client::request`] does, without waiting; [`Client::answer_text`] waits.
     ///
     /// * returns - its number.
     ///
@@ -346,9 +346,9 @@ impl Client {
         Ok(header.request)
     }
 
-    /// Waits for the answer to a request; answers to others are passed over.
+    /// Waits for the answer to a request; other answers are skipped.
     ///
-    /// * returns - its JSON; `None`: not within the time, it may come yet.
+    /// * returns - its JSON; `None`: not within the time, it may still come.
     ///
     /// # Errors
     /// `Error::Io` when it cannot be read.
@@ -372,9 +372,9 @@ impl Client {
     }
 }
 
-/// The ends that a restart means for the pairs certified colliding in the boot that is over.
+/// The ends of all pairs certified colliding in the boot that a restart ended.
 ///
-/// * `tick` - the last tick heard of.
+/// * `tick` - the last tick received.
 fn ends_of(tick: u64, pairs: impl Iterator<Item = PairRow>) -> Vec<PairRow> {
     let colliding = Verdict::Colliding.code();
     pairs

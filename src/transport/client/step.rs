@@ -11,7 +11,7 @@ pub enum StepError {
     /// No tick used the frame in time; the text says what was refused meanwhile.
     #[error("{0}")]
     TimedOut(String),
-    /// The daemon restarted; the ends of all pairs are in it.
+    /// The daemon restarted; contains the ends of all pairs.
     #[error("the daemon restarted (boot {:x} is over, {:x} began)", .0.old_boot, .0.new_boot)]
     Restarted(Restarted),
     /// A tick used a newer frame of this source; this one has no result of its own.
@@ -36,7 +36,7 @@ impl From<StepError> for Error {
     }
 }
 
-/// What a tick says of one of our frames.
+/// What happened to one of our frames, according to a tick.
 enum Fate {
     Used,
     PassedOver,
@@ -68,7 +68,7 @@ fn fate(tick: &TickRow, source: &str, frame: FrameId) -> Fate {
 impl Client {
     /// Sends a frame and waits for the first tick that used it; then [`Client::view`] is its result.
     ///
-    /// A tick names the newest frame it used of each source, so the result is never that of another frame.
+    /// A tick names the newest frame that it used of each source, so the result is never that of another frame.
     ///
     /// # Errors
     /// See [`StepError`].
@@ -78,7 +78,7 @@ impl Client {
         rows: Rows<'_>,
         timeout_ns: u64,
     ) -> Result<FrameId, StepError> {
-        // what is already there is from before the frame
+        // Ticks that are already there are from before the frame.
         if let Heard::Restarted(restarted) = self.latest()? {
             return Err(StepError::Restarted(restarted));
         }
@@ -117,7 +117,7 @@ impl Client {
         }
     }
 
-    /// What the ticks since said that may explain it.
+    /// What the ticks since then reported that may explain it.
     fn why_no_result(&self, source: &str, before: &TickRow) -> String {
         let tick = self.view().tick();
         if tick.header.tick == before.header.tick {

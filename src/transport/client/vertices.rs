@@ -1,4 +1,4 @@
-//! Vertices of bodies that deform: what a source sends of them.
+//! Vertices of bodies that deform, as a source sends them.
 
 use super::Client;
 use crate::error::{Error, Result};
@@ -9,27 +9,28 @@ use crate::wire::{VertexHeader, VertexRow, WIRE_VERSION, name_bytes, vertex_flag
 pub enum Part {
     /// All of them.
     Full,
-    /// Some, from `first` on, of a mesh that has `total`: they take the place of those sent before.
+    /// Some, from `first` on, of a mesh that has `total`: they replace those sent before.
     Range {
-        /// Place of the first.
+        /// Index of the first.
         first: u32,
-        /// How many vertices the mesh has.
+        /// Number of vertices of the mesh.
         total: u32,
     },
 }
 
 impl Client {
-    /// Sends vertices of a body that deforms; they belong with the frame that is sent next.
+    /// Sends vertices of a body that deforms; they belong to the frame that is sent next.
     ///
     /// * `rows` - body frame, metres.
     /// * returns - their version.
     ///
-    /// Where the daemon has missed or refused vertices of the body (`bodies` says `rejected` and why), it needs all of
+    /// If the daemon has missed or refused vertices of the body (`bodies` says `rejected` and why), it needs all of
     /// them again.
     ///
     /// # Errors
-    /// `Error::Usage` when the client was opened without a source, or a range is sent before all have been; `Error::Io`
-    /// when they cannot be handed over: the daemon then needs all vertices again of each body that this source bends.
+    /// `Error::Usage` when the client was opened without a source, or a range is sent before all vertices were;
+    /// `Error::Io` when they cannot be sent: the daemon then needs all vertices again for each body that this source
+    /// bends.
     pub fn send_vertices(&mut self, body: u64, part: Part, rows: &[VertexRow]) -> Result<u64> {
         let source = self.source.as_deref().ok_or_else(|| {
             Error::Usage(
@@ -66,7 +67,7 @@ impl Client {
             schema: WIRE_VERSION,
             boot: self.boot(),
         };
-        // Counted first, as a frame is.
+        // Counted first, as with a frame.
         self.versions.insert(body, header.version);
         self.bent += 1;
         self.link.send_vertices(&header, rows)?;

@@ -1,4 +1,4 @@
-//! Frees what dead clients left behind, off the tick thread: one cleaning costs 7 to 30 ms when there is work.
+//! Frees what dead clients left behind, on a separate thread: one cleaning costs 7 to 30 ms when there is work.
 
 use std::path::Path;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -11,9 +11,9 @@ use super::qos::{self, Ipc};
 use crate::error::{Error, Result};
 use iceoryx2::prelude::Node;
 
-/// Between two looks. An idle look costs 0.5 ms; a dead source's slot is free within this and one cleaning.
+/// Time between two checks. An idle check costs 0.5 ms; a dead source's slot is free within this and one cleaning.
 const PERIOD: Duration = Duration::from_millis(500);
-/// Nodes that are named in a line.
+/// Number of nodes named in a log line.
 const NAMED: usize = 3;
 
 /// The cleaning thread; dropping it ends and joins the thread.
@@ -67,14 +67,15 @@ fn clean_until(node: &Node<Ipc>, place: &Place, stopped: &Receiver<()>) {
 /// Nodes that could not be cleaned up.
 #[derive(Debug, Default)]
 struct Failures {
-    /// At the look before.
+    /// Number at the last check.
     before: u64,
     told: u64,
 }
 
 impl Failures {
-    /// Whether there are more than were told: of those that the look before had, too, for one that another process is
-    /// just cleaning up is gone by the next look. What stays is told once, and not with every look.
+    /// Returns whether there are more than were reported. Only failures that the last check had too are counted, for a
+    /// node that another process is just cleaning up is gone by the next check. Lasting failures are reported once, not
+    /// with every check.
     fn are_news(&mut self, failed: u64) -> bool {
         let lasting = failed.min(self.before);
         self.before = failed;
@@ -84,7 +85,7 @@ impl Failures {
 }
 
 impl Stuck {
-    /// Says what stays, why, and whether that matters.
+    /// Logs what is left behind, why, and whether that matters.
     fn tell(&self, place: &Place) {
         if !self.nodes.is_empty() {
             tracing::warn!("{}", self.words());
@@ -121,7 +122,7 @@ impl Stuck {
 
 impl Drop for Cleaner {
     fn drop(&mut self) {
-        // the closed channel ends the thread at once
+        // Closing the channel ends the thread at once.
         self.stop = None;
         if let Some(thread) = self.thread.take() {
             let _ended_anyway = thread.join();
@@ -138,7 +139,7 @@ mod tests {
         let mut failures = Failures::default();
         let looks = [
             (0, false),
-            // Somebody else may be just at it.
+            // Another process may be cleaning them up.
             (2, false),
             (2, true),
             (2, false),

@@ -1,7 +1,7 @@
-//! What dead processes left behind, for `sweepd doctor`. In: a place. Out: what there is; or, asked to, it is removed.
+//! What dead processes left behind, for `sweepd doctor`. In: a place. Out: a list; or, on request, it is removed.
 //!
-//! Whether a node is dead is iceoryx2's word: each living process holds a lock of the kernel. What only looks unused is
-//! told and never removed: a process of another pid namespace that shares the memory is not seen from here.
+//! iceoryx2 decides whether a node is dead: each living process holds a kernel lock. What only looks unused is reported
+//! and never removed: a process of another pid namespace that shares the memory is not visible from here.
 
 use std::collections::BTreeSet;
 use std::os::unix::fs::MetadataExt;
@@ -20,67 +20,67 @@ use crate::transport::open_files::short;
 
 /// How long to wait for another process that is cleaning up the same node.
 const OTHERS: Duration = Duration::from_secs(1);
-/// A younger file may be one that its maker is about to map, seconds.
+/// A younger file may be one that its creator is about to map, seconds.
 const YOUNG_S: i64 = 5;
-/// Part of the names of files that iceoryx2 makes once and keeps for ever.
+/// Part of the names of files that iceoryx2 creates once and keeps for ever.
 const KEPT: &str = ".global_mgmt";
 
-/// Whose a node is.
+/// The owner of a node.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct NodeOwner {
-    /// The node's name: `sweepd/INSTANCE/ROLE`, or what another program calls it.
+    /// The node's name: `sweepd/INSTANCE/ROLE`, or the name given by another program.
     pub name: String,
-    /// The process that made it, as its own pid namespace counts; 0: not known.
+    /// Id of the process that made it, in its own pid namespace; 0: unknown.
     pub pid: u32,
-    /// Its executable; empty: not known.
+    /// Its executable; empty: unknown.
     pub executable: String,
 }
 
-/// The parent of a process that has ended and that nobody has waited for; `None`: it runs, or is not seen from here.
+/// The parent of a process that has ended but was not reaped; `None`: it runs, or is not visible from here.
 #[must_use]
 pub fn unreaped_by(node: &NodeOwner) -> Option<u32> {
     let process = process(node.pid)?;
     (process.state == 'Z' && process.is_named(&node.executable)).then_some(process.parent)
 }
 
-/// What there is under a place's files.
+/// What exists under a place's files.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Leftovers {
     /// Nodes of living processes.
     pub alive: Vec<NodeOwner>,
     /// Nodes of dead processes: each holds services, ports and shared memory.
     pub dead: Vec<NodeOwner>,
-    /// Nodes that this user may not look at, and nodes whose files are damaged.
+    /// Nodes that this user may not inspect, and nodes whose files are damaged.
     pub unclear: usize,
-    /// Locks that nobody holds.
+    /// Locks without a holder.
     pub locks: Vec<Lock>,
     /// Shared memory that no process has mapped.
     pub unmapped: Unmapped,
 }
 
-/// Files in shared memory that no process that can be seen has mapped. Those of dead nodes are among them.
+/// Files in shared memory that no visible process has mapped, including those of dead nodes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Unmapped {
-    /// How many.
+    /// Number of files.
     pub files: usize,
-    /// Memory that they take, bytes.
+    /// Memory used by them, bytes.
     pub bytes: u64,
     /// One of them.
     pub example: Option<PathBuf>,
 }
 
-/// What [`clean_leftovers`] did.
+/// Result of [`clean_leftovers`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Cleaned {
-    /// Nodes of dead processes that are gone, with all that they had.
+    /// Removed nodes of dead processes, with everything that they owned.
     pub nodes: Vec<NodeOwner>,
-    /// Locks that are gone.
+    /// Removed locks.
     pub locks: Vec<Lock>,
     /// What could not be removed, and why.
     pub failed: Vec<String>,
 }
 
-/// Looks at what is left under a place's files, and changes nothing; the place's own name does not matter.
+/// Lists what is left under a place's files, without changes; the place's own instance name does not matter.
 ///
 /// # Errors
 /// `Error::Refused` when the files are another user's, `Error::Io` when they cannot be read.
@@ -106,7 +106,7 @@ pub fn leftovers(place: &Place) -> Result<Leftovers> {
 /// Removes what dead processes of this user left under a place's files: of one instance, or all.
 ///
 /// # Errors
-/// As [`leftovers`]; what cannot be removed is no error, it is told.
+/// As [`leftovers`]; what cannot be removed is no error, it is listed in the result.
 pub fn clean_leftovers(place: &Place, instance: Option<&str>) -> Result<Cleaned> {
     let mut done = Cleaned::default();
     let dead = if place.check_owner()? {
@@ -130,7 +130,7 @@ pub fn clean_leftovers(place: &Place, instance: Option<&str>) -> Result<Cleaned>
     for lock in free.filter(|lock| instance.is_none_or(|name| lock.instance == name)) {
         match lock::remove_free(&lock.path) {
             Ok(true) => done.locks.push(lock),
-            // Somebody took it meanwhile.
+            // Another process took it meanwhile.
             Ok(false) => {}
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => {}
             Err(e) => done.failed.push(format!("{}: {e}", lock.path.display())),
@@ -140,13 +140,14 @@ pub fn clean_leftovers(place: &Place, instance: Option<&str>) -> Result<Cleaned>
 }
 
 impl NodeOwner {
-    /// Whether the node does not say whose it is: its process ended while it came or went, and nothing is its any more.
+    /// Returns whether the node has no owner data: its process ended while it created or dropped the node, and owns
+    /// nothing any more.
     #[must_use]
     pub fn is_unknown(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Whether it is a node of this instance's daemon or of one of its clients.
+    /// Returns whether it is a node of this instance's daemon or of one of its clients.
     #[must_use]
     pub fn is_of(&self, instance: &str) -> bool {
         let rest = self.name.strip_prefix("sweepd/");
@@ -195,16 +196,16 @@ fn owner(node: &impl NodeView) -> NodeOwner {
     })
 }
 
-/// Dead nodes that stay.
+/// Dead nodes that could not be removed.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Stuck {
-    /// Which, and why.
+    /// Which nodes, and why.
     pub(super) nodes: Vec<String>,
-    /// Those that do not say whose they are: their processes ended while they came or went.
+    /// Number of nodes without owner data: their processes ended while creating or dropping them.
     pub(super) unmade: usize,
 }
 
-/// Tries once more to remove what dead processes left under a place's files; what stays.
+/// Tries once more to remove what dead processes left under a place's files; returns what could not be removed.
 ///
 /// # Errors
 /// `Error::Io` when the nodes cannot be listed.
@@ -222,7 +223,7 @@ pub(super) fn stuck(place: &Place) -> Result<Stuck> {
 }
 
 fn remove(node: DeadNodeView<Ipc>) -> std::result::Result<(), String> {
-    // iceoryx2 would look for its files where its default ones are.
+    // iceoryx2 would look for its files under its default root.
     if node.details().is_none() {
         return Err(
             "its process ended while it made it, and its files do not say where they are"
@@ -232,7 +233,7 @@ fn remove(node: DeadNodeView<Ipc>) -> std::result::Result<(), String> {
     node.blocking_remove_stale_resources(OTHERS).map_err(why)
 }
 
-/// Why a dead node stays, in words.
+/// Why a dead node could not be removed, as text.
 fn why(failure: NodeCleanupFailure) -> String {
     let text = match failure {
         NodeCleanupFailure::InsufficientPermissions => "this user may not remove its files",
@@ -249,7 +250,7 @@ fn why(failure: NodeCleanupFailure) -> String {
     text.to_owned()
 }
 
-/// This user's files in shared memory with this prefix that are in no process's map.
+/// This user's files in shared memory with this prefix that no process has mapped.
 fn unmapped(prefix: &str) -> Unmapped {
     let mut found = Unmapped::default();
     let now_s = crate::time::SystemClock.realtime_ns() / 1_000_000_000;
@@ -277,7 +278,7 @@ fn unmapped(prefix: &str) -> Unmapped {
     found
 }
 
-/// Inode numbers of all shared memory that processes have mapped, as far as they may be looked at.
+/// Inode numbers of all shared memory mapped by processes, as far as these may be inspected.
 fn mapped_inodes() -> BTreeSet<u64> {
     let mut inodes = BTreeSet::new();
     for process in std::fs::read_dir("/proc").into_iter().flatten().flatten() {

@@ -1,4 +1,4 @@
-//! A client's ports over shared memory. It only opens what a daemon has made.
+//! A client's ports over shared memory. It only opens what a daemon has created.
 
 mod answers;
 mod news;
@@ -36,9 +36,9 @@ use crate::wire::{
     VertexRow,
 };
 
-/// Between two looks for a daemon.
+/// Time between two attempts to find a daemon.
 const RETRY: Duration = Duration::from_millis(50);
-/// A plan longer than this is no plan.
+/// A longer plan is invalid, bytes.
 const PLAN_BYTES_MAX: usize = 1 << 24;
 
 type Sender<T> = Option<Publisher<Ipc, [T], FrameHeader>>;
@@ -46,7 +46,7 @@ type Asker = RequestClient<Ipc, [u8], RequestHeader, [u8], AnswerHeader>;
 
 /// A client's ports over shared memory. Not `Send`.
 ///
-/// Ports keep their services open; all go before the node (field order).
+/// Ports keep their services open; all are dropped before the node (field order).
 pub struct IoxLink {
     pending: Vec<Pending>,
     requests: Option<Asker>,
@@ -78,7 +78,7 @@ impl std::fmt::Debug for IoxLink {
 }
 
 impl IoxLink {
-    /// Opens the instance's services, again and again until they are there or `until_ns` (monotonic) is reached.
+    /// Opens the instance's services, retrying until they are there or `until_ns` (monotonic) is reached.
     ///
     /// # Errors
     /// `Error::Refused` when the files are another user's or of another iceoryx2, the daemon speaks another wire
@@ -88,7 +88,7 @@ impl IoxLink {
         check_client()?;
         check_client_room()?;
         loop {
-            // a node of ours would make a missing root, which is the daemon's to make
+            // A node of ours would create a missing root, which only the daemon should.
             let tried = if place.check_owner()? {
                 Self::try_open(place)
             } else {
@@ -127,7 +127,7 @@ impl IoxLink {
             .listener_builder()
             .create()
             .map_err(|e| failed("ready", e))?;
-        // last: its coming wakes the daemon, which then sends us the newest hello and tick
+        // Last: its creation wakes the daemon, which then sends us the newest hello and tick.
         let wake = qos::event(&node, place, "wake", Open::Existing)?
             .notifier_builder()
             .default_event_id(EventId::new(events::SENT))
@@ -160,7 +160,8 @@ impl IoxLink {
         })
     }
 
-    /// Says that what is sent to or by this client does not pass for want of open files: nothing else would.
+    /// Fails if this client's connections could not be made because it may not open enough files: nothing else would
+    /// show it.
     fn check_met(&self) -> Result<()> {
         match self.spot.unmet.take() {
             0 => Ok(()),
@@ -169,7 +170,7 @@ impl IoxLink {
     }
 
     fn wake(&self, event: usize) {
-        // a daemon that is away is no error: it finds what was sent when it is back
+        // A daemon that is away is no error: it finds what was sent when it is back.
         let _nobody_there = self.wake.notify_with_custom_event_id(EventId::new(event));
     }
 
@@ -198,7 +199,7 @@ impl IoxLink {
             topic,
             Open::Existing,
         ))?;
-        // room for the first frame: a sample sent right after a growth is lost if its sender ends before it is mapped
+        // Room for the first frame: a sample sent right after a growth is lost if its sender ends before it is mapped.
         let rows = rows.max(qos::SLICE_LEN_START);
         opened(qos::slice_publisher(&service, rows, &self.spot.unmet))
     }
@@ -233,7 +234,7 @@ impl Link for IoxLink {
         if topics.plan && self.plan.is_none() {
             self.plan = Some(self.reader("plan")?);
         }
-        // the daemon then gives us the newest names and plan
+        // The daemon then sends us the newest names and plan.
         self.wake(events::CREATED);
         self.check_met()
     }
@@ -270,7 +271,7 @@ impl Link for IoxLink {
         if let Some(port) = &self.vertices {
             send_frame(port, header, rows)?;
         }
-        // No wake-up: the frame that they belong with comes next.
+        // No wake-up: the frame that they belong to comes next.
         Ok(())
     }
 
@@ -371,7 +372,7 @@ impl Link for IoxLink {
         let Some(port) = &self.requests else {
             return Ok(());
         };
-        // answers nobody waits for any more give their place free
+        // Requests whose answers can no longer come free their place.
         self.pending.retain(Pending::is_connected);
         let mut request = port
             .loan_slice_uninit(len)

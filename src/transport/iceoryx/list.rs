@@ -1,4 +1,4 @@
-//! Which instances are there, for `sweepd list`.
+//! The existing instances, for `sweepd list`.
 
 use std::fmt::Debug;
 
@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::transport::open_files::check_client;
 use crate::wire::{ContactRow, PairRow, TransformRow, TransformVelRow};
 
-/// An instance as its services show it.
+/// An instance as seen from its services.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InstanceInfo {
     /// Its name.
@@ -36,13 +36,13 @@ pub struct InstanceInfo {
     pub contact_change_readers: usize,
 }
 
-/// The instances of this wire version under a place's root; the place's own name does not matter.
+/// The instances of this wire version under a place's root; the place's own instance name does not matter.
 ///
 /// # Errors
 /// `Error::Refused` when the root is another user's or this process may open too few files, `Error::Io` when it cannot
 /// be read.
 pub fn list_instances(place: &Place) -> Result<Vec<InstanceInfo>> {
-    // Who cannot open them takes instances for ones that nobody serves.
+    // Without enough files, instances would look as if they had no daemon.
     check_client()?;
     if !place.check_owner()? {
         return Ok(Vec::new());
@@ -61,7 +61,7 @@ pub fn list_instances(place: &Place) -> Result<Vec<InstanceInfo>> {
     let node = qos::node(place, "list")?;
     let mut instances = Vec::new();
     for name in names {
-        // other programs may have a service of that name
+        // Other programs may have a service of that name.
         if let Ok(place) = place.with_instance(&name) {
             instances.push(info(&node, &place));
         }
@@ -71,7 +71,7 @@ pub fn list_instances(place: &Place) -> Result<Vec<InstanceInfo>> {
 
 fn info(node: &Node<Ipc>, place: &Place) -> InstanceInfo {
     let holder = lock::holder(place);
-    // a service that a daemon of another version made cannot be opened; it counts as empty
+    // A service that a daemon of another version created cannot be opened; it counts as empty.
     InstanceInfo {
         instance: place.instance().to_owned(),
         pid: holder.as_ref().map(|h| h.pid),

@@ -1,5 +1,5 @@
-//! Two file locks. One beside the shared memory makes the instance single; one on iceoryx2's root keeps cleaners of
-//! temporary files out of it. The kernel drops both when the process dies, however it dies.
+//! Two file locks. One in the shared memory directory allows one daemon per instance; one on iceoryx2's root keeps
+//! cleaners of temporary files out of it. The kernel releases both when the process dies, however it dies.
 
 use std::fs::{DirBuilder, File, OpenOptions};
 use std::io::{Read, Seek, Write};
@@ -13,18 +13,19 @@ use serde::{Deserialize, Serialize};
 use super::place::Place;
 use crate::error::{Error, Result};
 
-/// Shared memory lives here; a lock beside it survives the removal of iceoryx2's root, which would let a second
-/// daemon make a second, silent set of services.
+/// Directory of shared memory; a lock in it survives the removal of iceoryx2's root, after which a second daemon could
+/// otherwise create a second set of services unnoticed.
 pub(super) const LOCK_DIR: &str = "/dev/shm";
-/// Times to try again when the file was removed between opening and locking, or somebody looks whether it is held.
+/// Number of retries when the file was removed between opening and locking, or another process is checking whether it
+/// is held.
 const TRIES_MAX: usize = 16;
-/// How long to wait for who looks: that takes some microseconds.
+/// How long to wait for such a check, which takes some microseconds.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// What the holder of an instance writes into its lock, for people and for clients of another iceoryx2 version.
+/// Data that the holder of an instance writes into its lock, for people and for clients of another iceoryx2 version.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Holder {
-    /// Its process, as its own pid namespace counts.
+    /// Its process id, in its own pid namespace.
     pub pid: u32,
     /// Random number of this start.
     pub boot_id: u64,
@@ -43,25 +44,25 @@ pub struct Lock {
     pub instance: String,
     /// The file.
     pub path: PathBuf,
-    /// Who has it; `None`: nobody, a killed daemon left it.
+    /// Its holder; `None`: none, a killed daemon left the file.
     pub holder: Option<Holder>,
 }
 
-/// The one holder of an instance. The file goes when it is dropped.
+/// The only holder of an instance. The file is removed when it is dropped.
 #[derive(Debug)]
 pub(super) struct InstanceLock {
     file: File,
     path: PathBuf,
 }
 
-/// Fowler, Noll, Vo (FNV-1a), 64 bit: tells roots and prefixes apart in the lock's name.
+/// Fowler, Noll, Vo (FNV-1a), 64 bit: distinguishes roots and prefixes in the lock's name.
 fn fnv(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &b| {
         (hash ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
     })
 }
 
-/// What stands before and behind the instance in the name of its lock.
+/// The parts of a lock's name before and after the instance.
 fn around(place: &Place) -> (String, String) {
     let uid = rustix::process::geteuid().as_raw();
     let files = format!("{}|{}", place.root().display(), place.prefix());
@@ -74,7 +75,7 @@ fn lock_path(place: &Place) -> PathBuf {
     Path::new(LOCK_DIR).join(format!("{start}{}{end}", place.instance()))
 }
 
-/// The locks of all instances under a place's files, by name; the place's own name does not matter.
+/// The locks of all instances under a place's files, by name; the place's own instance name does not matter.
 ///
 /// # Errors
 /// `Error::Io` when their directory cannot be read.
@@ -98,10 +99,9 @@ pub fn locks(place: &Place) -> Result<Vec<Lock>> {
     Ok(all)
 }
 
-/// Removes a lock file that nobody holds; whether it did.
+/// Removes a lock file without a holder; returns whether it did.
 ///
-/// It is locked as one who looks locks it: a daemon that starts meanwhile waits for that, finds the file gone and makes
-/// its own.
+/// It is locked as for a check: a daemon that starts meanwhile waits for that, finds the file gone and makes its own.
 pub(super) fn remove_free(lock: &Path) -> std::io::Result<bool> {
     let file = File::open(lock)?;
     let free = flock(&file, FlockOperation::NonBlockingLockShared).is_ok();
@@ -112,14 +112,14 @@ pub(super) fn remove_free(lock: &Path) -> std::io::Result<bool> {
     Ok(false)
 }
 
-/// Who holds the instance now; `None`: nobody. Text that cannot be read counts as a holder of nothing known.
+/// The present holder of the instance; `None`: none. Unreadable text counts as a holder without data.
 pub(super) fn holder(place: &Place) -> Option<Holder> {
     holder_of(&lock_path(place))
 }
 
 fn holder_of(lock: &Path) -> Option<Holder> {
     let mut file = File::open(lock).ok()?;
-    // free to take: left behind by a killed daemon
+    // Free to take: left behind by a killed daemon.
     if flock(&file, FlockOperation::NonBlockingLockShared).is_ok() {
         return None;
     }
@@ -147,7 +147,7 @@ impl InstanceLock {
                 .open(&path)
                 .map_err(|e| refuse(format!("{}: {e}", path.display())))?;
             if flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
-                // to look for a holder locks it too, for a moment
+                // Checking for a holder locks it too, for a moment.
                 let Some(other) = holder(place) else {
                     #[allow(
                         clippy::disallowed_methods,
@@ -161,7 +161,7 @@ impl InstanceLock {
                     other.pid, other.sweepd_version
                 )));
             }
-            // the former holder may have removed the file after we opened it: a lock on nothing
+            // The former holder may have removed the file after we opened it: then the lock is useless.
             if !same_file(&file, &path) {
                 continue;
             }
@@ -181,7 +181,7 @@ impl InstanceLock {
 
 impl Drop for InstanceLock {
     fn drop(&mut self) {
-        // removed while still locked, and only if it is still ours: another's lock must never go
+        // Removed while still locked, and only if it is still ours: another's lock must never be removed.
         if same_file(&self.file, &self.path) {
             let _gone_already = std::fs::remove_file(&self.path);
         }
@@ -195,14 +195,14 @@ fn same_file(file: &File, path: &Path) -> bool {
     }
 }
 
-/// A shared lock on iceoryx2's root: `systemd-tmpfiles` leaves locked directories alone.
+/// A shared lock on iceoryx2's root: `systemd-tmpfiles` skips locked directories.
 #[derive(Debug)]
 pub(super) struct RootLock {
     _dir: File,
 }
 
 impl RootLock {
-    /// Makes the root where it is missing, and holds it.
+    /// Creates the root if it is missing, and holds it.
     ///
     /// # Errors
     /// `Error::Refused` when it cannot be made or opened.
@@ -214,14 +214,14 @@ impl RootLock {
                 root.display()
             ))
         };
-        // as iceoryx2 would make it: nobody else may write
+        // As iceoryx2 would create it: no other user may write.
         DirBuilder::new()
             .recursive(true)
             .mode(0o750)
             .create(&root)
             .map_err(refuse)?;
         let dir = File::open(&root).map_err(refuse)?;
-        // a cleaner may hold it for a moment; then it is just not protected from that one run
+        // A cleaner may hold it for a moment; then it is just not protected from that one run.
         let _best_effort = flock(&dir, FlockOperation::NonBlockingLockShared);
         Ok(Self { _dir: dir })
     }

@@ -1,10 +1,10 @@
-//! Shared memory between processes: the one door to iceoryx2. In: samples of untrusted layout but trusted origin
-//! (files are 0600: same user only). Out: copies, checked for what would hurt memory; all else `world` checks.
+//! Shared memory between processes: the only module that uses iceoryx2. In: samples of untrusted layout but trusted
+//! origin (files are 0600: same user only). Out: copies, checked for memory safety; `world` checks everything else.
 //!
-//! What iceoryx2 does not check and this room or `world` does: field layout (version in type names, `schema` in
-//! headers), counts beyond limits, values changing after the send (copied once, then checked).
+//! Not checked by iceoryx2, but by this room or `world`: field layout (version in type names, `schema` in headers),
+//! counts beyond limits, values that change after the send (copied once, then checked).
 //!
-//! Leaves nothing behind: ports go before services, services before the node, the node before the locks (field
+//! Leaves nothing behind: ports are dropped before services, services before the node, the node before the locks (field
 //! order of [`Server`]); after a kill the next daemon, or any node, cleans up.
 
 mod cleaner;

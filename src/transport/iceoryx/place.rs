@@ -1,4 +1,4 @@
-//! Where an instance lives: its name, the root directory and prefix of iceoryx2's files, whose they are.
+//! Where an instance is: its name, the root directory and prefix of iceoryx2's files, and their owner.
 
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -12,10 +12,10 @@ use crate::error::{Error, Result};
 /// Longest instance name, bytes.
 const INSTANCE_LEN_MAX: usize = 32;
 
-/// An instance's name and the files it lives in.
+/// An instance's name and the location of its files.
 ///
-/// The configuration of iceoryx2 is made from this alone: a configuration file in the current directory would put
-/// the daemon and its clients on different files.
+/// iceoryx2's configuration is made from this only: a configuration file in the current directory could give the daemon
+/// and its clients different files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     instance: String,
@@ -55,8 +55,8 @@ impl Place {
         self
     }
 
-    /// The same files for who looks and changes nothing: its nodes leave what dead ones left, where others clean it up
-    /// when they are made, when they open a service and when they go.
+    /// The same files for a process that only reads: its nodes leave dead ones alone, while others clean them up when
+    /// they are created, when they open a service and when they are dropped.
     #[must_use]
     pub fn looking_only(mut self) -> Self {
         self.looks_only = true;
@@ -86,7 +86,7 @@ impl Place {
         format!("{}/v{}/{topic}", self.instance, crate::wire::WIRE_VERSION)
     }
 
-    /// Name of the service that says which wire version the others are of.
+    /// Name of the service that shows the wire version of the others.
     pub(super) fn hello(&self) -> String {
         format!("{}/hello", self.instance)
     }
@@ -106,7 +106,7 @@ impl Place {
             .unwrap_or_else(|| Config::default().global.prefix.to_string())
     }
 
-    /// The configuration of iceoryx2, made from nothing but this place.
+    /// iceoryx2's configuration, made only from this place.
     pub(super) fn config(&self) -> Result<Config> {
         set_log_level_from_env_or(LogLevel::Fatal);
         let mut config = Config::default();
@@ -129,8 +129,8 @@ impl Place {
         Ok(config)
     }
 
-    /// Whether the root is there; refused when it is another user's: iceoryx2 would drop samples in silence
-    /// where root meets another user.
+    /// Returns whether the root exists; refused when it is another user's: if root and another user share it, iceoryx2
+    /// drops samples silently.
     pub(super) fn check_owner(&self) -> Result<bool> {
         check_owner(&self.root())
     }
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn a_root_of_another_user_is_refused_with_both_ids() {
-        // /proc/1 belongs to root; as root, /tmp gets a directory of somebody else
+        // /proc/1 belongs to root; if run as root, /tmp gets a directory of another user.
         let theirs = if rustix::process::geteuid().is_root() {
             let dir = std::env::temp_dir().join(format!("sweepd_owner_{}", std::process::id()));
             std::fs::create_dir_all(&dir).unwrap();
@@ -185,7 +185,7 @@ mod tests {
         let place = Place::new("x").unwrap().under(&theirs, "p_");
         let text = place.check_owner().unwrap_err().to_string();
         assert!(text.contains("belongs to user id"), "{text}");
-        // The command line has no other root to give.
+        // The command line has no option for another root.
         assert!(!text.contains("another root"), "{text}");
         if rustix::process::geteuid().is_root() {
             std::fs::remove_dir(&theirs).unwrap();

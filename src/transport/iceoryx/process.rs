@@ -1,11 +1,11 @@
-//! What the kernel tells of a process by its number.
+//! What the kernel knows about a process id.
 
 use std::path::Path;
 
 /// A process of this pid namespace.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Process {
-    /// Its name, cut to 15 bytes by the kernel.
+    /// Its name, truncated to 15 bytes by the kernel.
     pub name: String,
     /// `R`, `S`, `D`, `T`, `Z` ..: see proc(5).
     pub state: char,
@@ -13,12 +13,12 @@ pub struct Process {
     pub parent: u32,
 }
 
-/// `None`: there is none of that number.
+/// `None`: there is no process with this id.
 pub fn process(pid: u32) -> Option<Process> {
     read(&std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?)
 }
 
-/// `pid (name) state parent ..`; a name may hold spaces and brackets.
+/// `pid (name) state parent ..`; a name may contain spaces and parentheses.
 fn read(stat: &str) -> Option<Process> {
     let (head, tail) = stat.rsplit_once(')')?;
     let (_, name) = head.split_once('(')?;
@@ -31,13 +31,13 @@ fn read(stat: &str) -> Option<Process> {
 }
 
 impl Process {
-    /// Whether it may be a process of this executable: numbers count anew in another namespace.
+    /// Returns whether it may be a process of this executable: in another namespace the id may be another process.
     pub fn is_named(&self, executable: &str) -> bool {
         !self.name.is_empty() && executable.starts_with(&self.name)
     }
 }
 
-/// Whether a process is in the same namespace of a kind (`mnt`, `time`, ..) as this one; `None`: it may not be asked.
+/// Returns whether a process is in the same namespace of a kind (`mnt`, `time`, ..) as this one; `None`: no permission.
 pub fn shares(pid: u32, kind: &str) -> Option<bool> {
     let of =
         |who: &str| std::fs::read_link(Path::new("/proc").join(who).join("ns").join(kind)).ok();

@@ -1,5 +1,5 @@
 //! Names, sizes and builders of the services. A service keeps its creator's sizes while any node has it open, so a
-//! number changed here needs all old clients to leave first.
+//! number changed here takes effect only after all old clients have left.
 
 use std::fmt::Debug;
 use std::time::Duration;
@@ -32,39 +32,39 @@ pub(super) type Ipc = ipc::Service;
 /// Requests: bytes to bytes, both with their header.
 pub(super) type Requests = ReqRes<Ipc, [u8], RequestHeader, [u8], AnswerHeader>;
 
-/// Publishers of `transforms`: every source, and room for restarts, the dead not yet cleaned, and a tunnel.
+/// Publishers of `transforms`: every source, plus restarted ones, dead ones not yet cleaned up, and a tunnel.
 const SOURCE_PUBLISHERS_MAX: usize = SOURCES_MAX + 8;
 /// Readers of `transforms`: the daemon, its successor, a recorder, a tunnel.
 const SOURCE_SUBSCRIBERS_MAX: usize = 4;
-/// Frames of one source that wait for the daemon; then the oldest goes (world counts the gap).
+/// Frames of one source that wait for the daemon; beyond that the oldest is dropped (world counts the gap).
 pub(super) const SOURCE_BUFFER: usize = 4;
-/// Vertex messages of one source that wait for the daemon; then the oldest goes, and what the source has bent is
-/// unknown until all of its vertices come again.
+/// Vertex messages of one source that wait for the daemon; beyond that the oldest is dropped, and what the source has
+/// bent is unknown until all of its vertices come again.
 pub(super) const VERTEX_BUFFER: usize = 64;
 /// Publishers of results: the daemon, its successor, a tunnel.
 const RESULT_PUBLISHERS_MAX: usize = 3;
-/// Readers of `tick`: every source that waits for its result, and as many onlookers.
+/// Readers of `tick`: every source that waits for its result, and as many other readers.
 const TICK_SUBSCRIBERS_MAX: usize = 48;
 /// Readers of each other message.
 const RESULT_SUBSCRIBERS_MAX: usize = 32;
-/// Messages that wait for one reader; then the oldest goes.
+/// Messages that wait for one reader; beyond that the oldest is dropped.
 const RESULT_BUFFER: usize = 8;
 /// Messages a reader may hold.
 const RESULT_BORROWED: usize = 4;
-/// Places of one result message in shared memory: all that readers may hold, one for who comes late, two being written.
+/// Slots of one result message in shared memory: all that readers may hold, one for late joiners, two being written.
 pub(super) const RESULT_PLACES: u64 =
     (RESULT_SUBSCRIBERS_MAX * (RESULT_BUFFER + RESULT_BORROWED) + 3) as u64;
 /// Nodes on one service.
 const NODES_MAX: usize = 64;
-/// Clients that may ask.
+/// Clients that may send requests.
 const CLIENTS_MAX: usize = 32;
 /// Open requests of one client.
 const ACTIVE_REQUESTS: usize = 2;
 /// Answers that wait for one request.
 const RESPONSE_BUFFER: usize = 8;
-/// Slices start this long and grow by powers of two; growing costs a mapping on both sides.
+/// Initial length of slices; they grow by powers of two, and growing costs a mapping on both sides.
 pub(super) const SLICE_LEN_START: usize = 256;
-/// Requests start this long, bytes.
+/// Initial length of requests, bytes.
 pub(super) const REQUEST_LEN_START: usize = 1 << 14;
 
 /// Event ids of `wake` and `ready`.
@@ -73,7 +73,7 @@ pub(super) mod events {
     pub(in super::super) const SENT: usize = 1;
     /// `wake`: a request was sent. `ready`: an answer was sent.
     pub(in super::super) const ASKED: usize = 2;
-    /// Somebody in the daemon's own process has work for the tick thread.
+    /// Another thread of the daemon's own process has work for the tick thread.
     pub(in super::super) const INTERNAL: usize = 3;
     /// A notifier's node died and was cleaned up.
     pub(in super::super) const DEAD: usize = 13;
@@ -85,19 +85,19 @@ pub(super) mod events {
     pub(in super::super) const MAX: usize = 15;
 }
 
-/// Shortest sleep on a port: iceoryx2 0.10 hands the system a time in whole microseconds, rounded down, and 0 is for
-/// ever.
+/// Shortest sleep on a port: iceoryx2 0.10 passes the system a time in whole microseconds, rounded down, and 0 means
+/// for ever.
 pub(super) const SLEEP_MIN: Duration = Duration::from_micros(1);
 
-/// Whether a service is made when it is missing. Clients only open: after a removed root a client that creates would
-/// make a second, silent set of services.
+/// Whether a missing service is created. Clients only open: after the root was removed, a client that creates would
+/// make a second set of services unnoticed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Open {
     Create,
     Existing,
 }
 
-/// What a layer of iceoryx2 said, as one of ours.
+/// An error of an iceoryx2 layer, converted to ours.
 pub(super) fn failed<E>(what: impl std::fmt::Display, e: E) -> Error
 where
     E: std::error::Error + Send + Sync + 'static,
@@ -105,7 +105,8 @@ where
     Error::io(format!("{what}: {e}"), e)
 }
 
-/// Whether what could not be opened is not there: no daemon has made it, or it went with the last who held it.
+/// Returns whether the service that could not be opened does not exist: no daemon has created it, or it went with its
+/// last user.
 pub(super) fn is_away(e: &Error) -> bool {
     let Error::Io { source, .. } = e else {
         return false;
@@ -126,7 +127,7 @@ pub(super) fn node_of<S: Service>(place: &Place, role: &str) -> Result<Node<S>> 
     NodeBuilder::new()
         .name(&name)
         .config(&place.config()?)
-        // signals belong to the host program
+        // Signals belong to the host program.
         .signal_handling_mode(SignalHandlingMode::Disabled)
         .create::<S>()
         .map_err(|e| {
@@ -157,7 +158,7 @@ where
 
 /// `transforms` or `transforms_vel`.
 ///
-/// No history: a frame without `sent_ns` that a new daemon got from an old client's history would look fresh.
+/// No history: a frame without `sent_ns` that a new daemon gets from an old client's history would look fresh.
 pub(super) fn frames<T: Debug + ZeroCopySend>(
     node: &Node<Ipc>,
     place: &Place,
@@ -183,7 +184,7 @@ pub(super) fn frames<T: Debug + ZeroCopySend>(
     open_slice(&name, builder, open)
 }
 
-/// `vertices`: of one body a message. No history, as of frames.
+/// `vertices`: one message per body. No history, as for frames.
 pub(super) fn vertices(
     node: &Node<Ipc>,
     place: &Place,
@@ -208,7 +209,7 @@ pub(super) fn vertices(
     open_slice(&name, builder, open)
 }
 
-/// A result message: rows under a [`MessageHeader`]. Late joiners get the newest.
+/// A result message: rows with a [`MessageHeader`]. Late joiners get the newest.
 pub(super) fn results<T: Debug + ZeroCopySend>(
     node: &Node<Ipc>,
     place: &Place,
@@ -218,7 +219,7 @@ pub(super) fn results<T: Debug + ZeroCopySend>(
     results_under(node, place, (topic, 1), open)
 }
 
-/// `changes` or `contact_changes`: rows under a [`ChangesHeader`]. No history: the newest message says nothing without
+/// `changes` or `contact_changes`: rows with a [`ChangesHeader`]. No history: the newest message is useless without
 /// those before it.
 pub(super) fn changes<T: Debug + ZeroCopySend>(
     node: &Node<Ipc>,
@@ -229,7 +230,7 @@ pub(super) fn changes<T: Debug + ZeroCopySend>(
     results_under(node, place, (topic, 0), open)
 }
 
-/// Rows under a header; with the topic how many of the newest messages late joiners get.
+/// Rows with a header; `topic` comes with the number of newest messages that late joiners get.
 fn results_under<T, H>(
     node: &Node<Ipc>,
     place: &Place,
@@ -259,7 +260,7 @@ where
     open_slice(&name, builder, open)
 }
 
-/// `tick`: one row a message.
+/// `tick`: one row per message.
 pub(super) fn ticks(
     node: &Node<Ipc>,
     place: &Place,

@@ -1,6 +1,6 @@
-//! Whether shared memory has room for a scene's messages: who writes beyond its end is killed (SIGBUS), with no error
-//! to handle. In: the scene's sizes. Out: bytes, and what to say. And whether this process may have as many files as it
-//! takes, and as large ones: shared memory is files.
+//! Checks whether shared memory has room for a scene's messages: a process that writes beyond its end is killed
+//! (SIGBUS), with no error to handle. In: the scene's sizes. Out: bytes, and the text of a warning. Also checks whether
+//! this process may open enough files, and large enough ones: shared memory is files.
 
 use rustix::fs::statvfs;
 use rustix::process::{Resource, getrlimit};
@@ -15,12 +15,12 @@ use crate::limits::{
 };
 use crate::wire::{BodyRow, ContactRow, NameRow, PairRow, RegionRow, TransformVelRow};
 
-/// Messages of a topic that are there at once: one that is written, one kept for late joiners, one that is read. Where
-/// readers are slow there are more.
+/// Messages of a topic that exist at once: one being written, one kept for late joiners, one being read. With slow
+/// readers there are more.
 const MESSAGES: u64 = 3;
-/// What a daemon and some clients take before any message, bytes.
+/// Memory of a daemon and some clients before any message, bytes.
 const BASE: u64 = 4 << 20;
-/// Headers of a message at most, bytes: those of iceoryx2 and ours.
+/// Largest headers of a message, bytes: those of iceoryx2 and ours.
 const HEADERS: u64 = 256;
 
 /// Bytes of shared memory that the messages of a scene may take at its limits, while its readers keep up.
@@ -44,7 +44,7 @@ pub fn bytes_needed(limits: &Limits, bodies: usize, sources: usize) -> u64 {
         message::<NameRow>(bodies),
         // Verdicts, a byte each.
         message::<u8>(bodies),
-        // Any source may hold all bodies but those of others: together they hold each once.
+        // A body belongs to one source only: all sources together send each body once.
         message::<TransformVelRow>(bodies).saturating_add(sources << 12),
     ]
     .iter()
@@ -71,25 +71,25 @@ fn most_rows(limits: &Limits, bodies: usize) -> Rows {
     Rows {
         bodies,
         pairs,
-        // Whatever the limit is, the deepest pair goes out whole.
+        // Whatever the limit, the deepest pair is sent with all its rows.
         contacts: contacts.min(most(limits.contact_rows.max(limits.contacts_per_pair))),
         regions: regions.min(most(limits.region_rows.max(REGIONS_PER_PAIR_MAX))),
     }
 }
 
-/// Messages grow by powers of two, but only what is written takes memory.
+/// Messages grow by powers of two, but only written pages take memory.
 fn message<T>(rows: u64) -> u64 {
     rows.saturating_mul(u64::try_from(size_of::<T>()).unwrap_or(u64::MAX))
 }
 
-/// What to say where shared memory has less room than a scene's messages may need; `None`: it has more, or cannot be
-/// looked at.
+/// The warning if shared memory has less room than a scene's messages may need; `None`: it has enough, or cannot be
+/// inspected.
 #[must_use]
 pub fn scarce(needed: u64) -> Option<String> {
     told(free()?, needed)
 }
 
-/// Bytes of shared memory that are free; `None`: it cannot be looked at, or has no limit, where it says 0 of all.
+/// Free bytes of shared memory; `None`: it cannot be inspected, or has no limit (its total size is then 0).
 fn free() -> Option<u64> {
     let stat = statvfs(LOCK_DIR).ok()?;
     (stat.f_blocks > 0).then(|| stat.f_bavail.saturating_mul(stat.f_frsize))
@@ -108,11 +108,11 @@ fn told(free: u64, needed: u64) -> Option<String> {
     })
 }
 
-/// Refuses to begin where it would end halfway, with an error that names no cause.
+/// Refuses to start if it would fail halfway, with an error that names no cause.
 ///
 /// # Errors
-/// `Error::Refused` when this process may open fewer files than a daemon needs, not make as large ones, or have less
-/// address space; or when shared memory has no room for its ports.
+/// `Error::Refused` when this process may open fewer files than a daemon needs, or may not create large enough ones, or
+/// has too little address space; or when shared memory has no room for its ports.
 pub(super) fn check_limits() -> Result<()> {
     let limit = |resource| getrlimit(resource).current;
     enough_files(limit(Resource::Nofile))?;
@@ -129,7 +129,7 @@ pub(super) fn check_client_room() -> Result<()> {
     has_room("a client", free(), SHARED_BYTES_A_CLIENT)
 }
 
-/// * `free` - bytes of shared memory; `None`: not known.
+/// * `free` - bytes of shared memory; `None`: unknown.
 fn has_room(who: &str, free: Option<u64>, least: u64) -> Result<()> {
     match free {
         Some(free) if free < least => Err(Error::Refused(format!(
@@ -143,7 +143,7 @@ fn has_room(who: &str, free: Option<u64>, least: u64) -> Result<()> {
     }
 }
 
-/// * `bytes` - of address space that this process may have; `None`: any number.
+/// * `bytes` - address space that this process may use; `None`: unlimited.
 fn wide_enough(bytes: Option<u64>) -> Result<()> {
     match bytes {
         Some(bytes) if bytes < ADDRESS_BYTES_LEAST => Err(Error::Refused(format!(
@@ -156,7 +156,7 @@ fn wide_enough(bytes: Option<u64>) -> Result<()> {
     }
 }
 
-/// * `files` - that may be open; `None`: any number.
+/// * `files` - number of files that may be open; `None`: unlimited.
 fn enough_files(files: Option<u64>) -> Result<()> {
     match files {
         Some(files) if files < OPEN_FILES_LEAST => Err(Error::Refused(format!(
@@ -167,7 +167,7 @@ fn enough_files(files: Option<u64>) -> Result<()> {
     }
 }
 
-/// * `bytes` - that a file may have; `None`: any number.
+/// * `bytes` - largest allowed file size; `None`: unlimited.
 fn large_enough(bytes: Option<u64>) -> Result<()> {
     match bytes {
         Some(bytes) if bytes < FILE_BYTES_LEAST => Err(Error::Refused(format!(
@@ -180,7 +180,7 @@ fn large_enough(bytes: Option<u64>) -> Result<()> {
     }
 }
 
-/// What to say where this process may not make as large files as a scene's messages may need; `None`: it may.
+/// The warning if this process may not create files as large as a scene's messages may need; `None`: it may.
 #[must_use]
 pub fn cramped(limits: &Limits, bodies: usize) -> Option<String> {
     cramped_by(
@@ -201,8 +201,8 @@ fn cramped_by(bytes: u64, needed: u64) -> Option<String> {
     })
 }
 
-/// Bytes of the largest file that the messages of a scene may need at its limits: a file has places for all that
-/// readers may hold of one kind, of which those in use alone take memory.
+/// Bytes of the largest file that the messages of a scene may need at its limits: a file has slots for all messages of
+/// one kind that readers may hold, but only used ones take memory.
 fn largest_file(limits: &Limits, bodies: usize) -> u64 {
     let rows = most_rows(limits, bodies);
     [
@@ -216,14 +216,14 @@ fn largest_file(limits: &Limits, bodies: usize) -> u64 {
     .fold(FILE_BYTES_LEAST, u64::max)
 }
 
-/// A message is as long as the next power of two.
+/// A message is rounded up to the next power of two.
 fn file<T>(rows: u64) -> u64 {
     let message = message::<T>(rows).saturating_add(HEADERS);
     let whole = message.checked_next_power_of_two().unwrap_or(u64::MAX);
     whole.saturating_mul(qos::RESULT_PLACES)
 }
 
-/// For people.
+/// A readable size.
 fn mib(bytes: u64) -> String {
     match bytes.div_ceil(1 << 20) {
         0 | 1 if bytes < 1 << 20 => format!("{bytes} bytes"),
@@ -252,7 +252,7 @@ mod tests {
             ..limits
         };
         assert!(bytes_needed(&small, 100_000, 2) < many);
-        // The deepest pair goes out whole where it alone has more rows than the limit.
+        // The deepest pair is sent with all its rows, even if it alone has more than the limit.
         let one = Limits {
             contact_rows: 1,
             contacts_per_pair: 16,
@@ -303,7 +303,7 @@ mod tests {
         let text = large_enough(Some(4096)).unwrap_err().to_string();
         assert!(text.contains("4096 bytes"), "{text}");
         assert!(large_enough(Some(FILE_BYTES_LEAST)).is_ok() && large_enough(None).is_ok());
-        // What a scene may need beyond that is a warning: few scenes are at their limits.
+        // Beyond that a scene's need is only a warning: few scenes are at their limits.
         let limits = Limits::default();
         let (few, many) = (largest_file(&limits, 5), largest_file(&limits, 100_000));
         assert_eq!(
@@ -332,7 +332,7 @@ mod tests {
         assert!(wide_enough(Some(ADDRESS_BYTES_LEAST)).is_ok() && wide_enough(None).is_ok());
     }
 
-    /// Both were killed without a word.
+    /// Both were killed without a message.
     #[test]
     fn bug_a_start_without_room_in_shared_memory_is_refused() {
         let text = has_room("a daemon", Some(100 << 10), SHARED_BYTES_LEAST)
@@ -363,7 +363,7 @@ mod tests {
             .unwrap();
         drop(server);
         std::fs::remove_dir_all(&root).unwrap();
-        // What iceoryx2 keeps for the next node of this prefix, which never comes.
+        // iceoryx2's files for the next node with this prefix, which never comes.
         for file in std::fs::read_dir(LOCK_DIR).unwrap().flatten() {
             if file.file_name().to_string_lossy().starts_with(&prefix) {
                 std::fs::remove_file(file.path()).unwrap();

@@ -48,19 +48,19 @@ use crate::wire::{
     VertexHeader, VertexRow, WIRE_VERSION,
 };
 
-/// How a server opens.
+/// Options for opening a server.
 #[derive(Clone, Debug)]
 pub struct ServerOptions {
     /// Instance and files.
     pub place: Place,
     /// Random number of this start, never 0; in every message.
     pub boot_id: u64,
-    /// The daemon's heartbeat, nanoseconds: a longer silence marks the frames found after it as having waited.
+    /// The daemon's heartbeat, nanoseconds: frames found after a longer silence are marked as having waited.
     pub heartbeat_ns: u64,
     /// Largest frame, rows.
     pub frame_rows_max: usize,
-    /// How long a wait looks for what has come before it sleeps, nanoseconds; `u64::MAX`: it never sleeps. Finding
-    /// takes 0.5 us, waking from a sleep 10 to 25 us.
+    /// How long a wait spins before it sleeps, nanoseconds; `u64::MAX`: it never sleeps. Spinning finds a message in
+    /// 0.5 us, waking from a sleep takes 10 to 25 us.
     pub spin_ns: u64,
 }
 
@@ -114,7 +114,7 @@ type Asked = ActiveRequest<Ipc, [u8], RequestHeader, [u8], AnswerHeader>;
 /// The daemon's side of an instance. Not `Send`: open it on the tick thread.
 ///
 /// Fields drop in this order, and the order matters: open requests and ports, then services, then the node, then the
-/// locks; a killed process leaves what it had to the clean-up of any other node.
+/// locks; what a killed process leaves is cleaned up by any other node.
 pub struct Server {
     arrivals: Arrivals,
     asked: BTreeMap<RequestToken, Asked>,
@@ -123,7 +123,7 @@ pub struct Server {
     transforms_vel: In<TransformVelRow>,
     vertices: In<VertexRow, VertexHeader>,
     wake: Listener<Ipc>,
-    /// To sleep on it; holds a port only meanwhile.
+    /// For sleeping; holds a port only during a sleep.
     sleeper: WaitSet<Ipc>,
     ready: Notifier<Ipc>,
     contacts: Out<ContactRow>,
@@ -135,7 +135,7 @@ pub struct Server {
     body_verdicts: Out<u8>,
     names: Out<NameRow>,
     names_owed: bool,
-    /// Begins and their ends that were never sent, because both were in messages that reached nobody.
+    /// Begins, with their ends, that were never sent because the messages of both reached no reader.
     cancelled: u64,
     plan: Out<u8>,
     plan_owed: bool,
@@ -146,15 +146,15 @@ pub struct Server {
     _root: RootLock,
     _lock: InstanceLock,
     options: ServerOptions,
-    /// Publisher ids of each session seen, to tell when its node is gone.
+    /// Session of each publisher id seen, to detect when its node is gone.
     sessions: BTreeMap<u128, u64>,
-    /// Publishers there at the last look, and those found gone at it.
+    /// Publishers at the last check, and those that it found gone.
     alive: Vec<u128>,
     gone: Vec<u128>,
     looked_ns: u64,
     peers_changed: bool,
     drained_ns: Option<u64>,
-    /// When the wake-up port was last looked at, monotonic.
+    /// When the wake-up port was last checked, monotonic.
     listened_ns: u64,
     patience: Patience,
     demand: Demand,
@@ -180,7 +180,7 @@ impl Debug for Server {
 }
 
 impl Server {
-    /// Opens every service of the instance and says hello.
+    /// Opens every service of the instance and sends hello.
     ///
     /// # Errors
     /// `Error::Refused` when the instance is taken, the root is another user's, or clients of a daemon with other
@@ -194,7 +194,7 @@ impl Server {
         let node = take_over(place)?;
         let unmet = &troubles.unmet;
         let requests = qos::requests(&node, place, Open::Create).map_err(held)?;
-        // one server a service: refuses a second daemon even where the lock file was removed by hand
+        // One server per service: refuses a second daemon even if the lock file was removed by hand.
         let answers = requests
             .server_builder()
             .initial_max_slice_len(qos::REQUEST_LEN_START)
@@ -272,7 +272,7 @@ impl Server {
 impl Door for Server {
     fn wait(&mut self, timeout_ns: u64, clock: &dyn Clock) -> Result<Wake> {
         let wake = self.spin_then_sleep(timeout_ns, clock)?;
-        // who just came gets the newest state now, not at the next tick
+        // A new client gets the newest state now, not at the next tick.
         if wake.peers_changed {
             self.update_connections();
         }
@@ -343,7 +343,7 @@ fn holder(options: &ServerOptions) -> Holder {
     }
 }
 
-/// A service that is there but does not fit was made by another version, and clients hold it open.
+/// A service that exists but does not fit was created by another version, and clients hold it open.
 fn held(e: Error) -> Error {
     match e {
         Error::Io { message, .. } => Error::Refused(format!(
@@ -353,7 +353,7 @@ fn held(e: Error) -> Error {
     }
 }
 
-/// The lock was free, and still somebody serves the instance.
+/// The lock was free, but another process serves the instance.
 fn refused_twice(place: &Place, e: &dyn std::fmt::Display) -> Error {
     let name = format!("sweepd/{}/daemon", place.instance());
     let alive = leftovers(place).map_or_else(|_| Vec::new(), |left| left.alive);
@@ -368,7 +368,7 @@ fn refused_twice(place: &Place, e: &dyn std::fmt::Display) -> Error {
     }
 }
 
-/// There is nothing to end: it has ended, and the kernel keeps it for its parent.
+/// There is no process to end: it has ended, and the kernel keeps it for its parent.
 fn unreaped(instance: &str, pid: u32, parent: u32) -> Error {
     let named = process(parent).map_or_else(String::new, |parent| format!(" ({})", parent.name));
     Error::Refused(format!(

@@ -1,8 +1,8 @@
-//! Services whose making was broken off: their maker was killed in the middle of it.
+//! Services that are half created because their creator was killed.
 //!
-//! In: a place whose instance this process holds. Out: its node; the files of such services are gone. iceoryx2 waits
-//! for whoever makes a service, gives up, and takes nobody's word for that he is dead: the instance could never be
-//! started again. Services of an instance are made by its daemon alone, so who holds its lock knows.
+//! In: a place whose instance this process holds. Out: its node; the files of such services are removed. iceoryx2 waits
+//! for the creator of a service and then gives up, and cannot be told that the creator is dead: the instance could
+//! never be started again. Services of an instance are created only by its daemon, so the holder of its lock knows.
 
 use std::fs;
 use std::os::unix::fs::MetadataExt;
@@ -16,12 +16,12 @@ use super::place::Place;
 use super::qos::{self, Ipc};
 use crate::error::Result;
 
-/// iceoryx2's folder of services under its root, and how their files end.
+/// iceoryx2's folder of services under its root, and the extension of their files.
 const FOLDER: &str = "services";
 const ENDING: &str = ".service";
-/// While a service is made its file may be written; then nobody may.
+/// While a service is created its file is writable; afterwards it is not.
 const WRITABLE: u32 = 0o200;
-/// What the services of this wire version are named after.
+/// Topic names of the services of this wire version.
 const TOPICS: [&str; 16] = [
     "transforms",
     "transforms_vel",
@@ -41,7 +41,7 @@ const TOPICS: [&str; 16] = [
     "requests",
 ];
 
-/// Takes the place over, from a daemon that was killed while it started as from any other: the node of the next one.
+/// Takes over the place, even from a daemon that was killed while it started; returns the node of the new daemon.
 pub(super) fn take_over(place: &Place) -> Result<Node<Ipc>> {
     if remove_unfinished(place) > 0 {
         tracing::info!(
@@ -51,7 +51,7 @@ pub(super) fn take_over(place: &Place) -> Result<Node<Ipc>> {
     qos::node(place, "daemon")
 }
 
-/// Removes the files of services of this instance that nobody will finish; returns how many.
+/// Removes the files of services of this instance that will never be finished; returns how many.
 fn remove_unfinished(place: &Place) -> usize {
     let folder = place.root().join(FOLDER);
     let services = TOPICS.map(|topic| place.service(topic));
@@ -63,8 +63,8 @@ fn remove_unfinished(place: &Place) -> usize {
     gone.count()
 }
 
-/// Names of the files that a service of this name may have, one for each pattern: the file of one half made may be
-/// empty, and says by its name alone whose it is.
+/// Names of the files that a service of this name may have, one for each pattern: the file of a half created one may be
+/// empty, so that only its name identifies it.
 fn files_of(place: &Place, service: &str) -> Vec<String> {
     let Ok(service) = qos::service_name(service) else {
         return Vec::new();

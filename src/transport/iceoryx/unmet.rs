@@ -1,19 +1,19 @@
-//! Connections between ports that could not be made: iceoryx2 goes on without them and says nothing, and tries again
-//! when another port of that kind comes or leaves.
+//! Connections between ports that could not be made: iceoryx2 continues without them silently, and tries again when
+//! another port of that kind comes or leaves.
 //!
-//! In: what iceoryx2 calls a degradation. Out: a count.
+//! In: iceoryx2's degradation events. Out: a count.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use iceoryx2::port::{DegradationAction, DegradationCause, DegradationInfo};
 
-/// Counts them for all ports of one side.
+/// A counter shared by all ports of one side.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Unmet(Arc<AtomicU64>);
 
 impl Unmet {
-    /// What a port does about one: it counts it and goes on, for one peer with broken files must not silence the
+    /// Handler for a port: it counts the failure and continues, since one peer with broken files must not silence the
     /// others.
     pub(super) fn handler(
         &self,
@@ -27,7 +27,7 @@ impl Unmet {
         }
     }
 
-    /// How many there were since the last call.
+    /// Number of failures since the last call.
     pub(super) fn take(&self) -> u64 {
         self.0.swap(0, Ordering::Relaxed)
     }

@@ -12,7 +12,7 @@ use crate::wire::{
     RegionRow, RequestHeader, TickRow, VertexHeader, VertexRow,
 };
 
-/// A client's ports in memory; a clean leave when dropped.
+/// A client's ports in memory; dropping it leaves cleanly.
 #[derive(Debug)]
 pub struct MemoryLink {
     shared: Arc<Shared>,
@@ -65,7 +65,7 @@ impl Link for MemoryLink {
         let Some(peer) = state.peers.get_mut(&self.peer) else {
             return Ok(());
         };
-        // who listens anew gets the newest
+        // A new subscriber gets the newest message.
         macro_rules! join {
             ($($topic:ident)+) => {$(
                 if topics.$topic && !peer.topics.$topic {
@@ -75,7 +75,7 @@ impl Link for MemoryLink {
             )+};
         }
         join!(pairs contacts regions bodies body_verdicts names plan);
-        // the newest message says nothing without those before it
+        // The newest message is useless without those before it.
         peer.changes_anew |= topics.changes && !peer.topics.changes;
         peer.changes_anew |= topics.contact_changes && !peer.topics.contact_changes;
         peer.topics.changes |= topics.changes;
@@ -113,7 +113,7 @@ impl Link for MemoryLink {
             peer.vertices.push_back((*header, rows.to_vec()));
             peer.session = header.session;
         }
-        // No wake-up: the frame that they belong with comes next.
+        // No wake-up: the frame that they belong to comes next.
         Ok(())
     }
 

@@ -1,7 +1,7 @@
-//! The in-process twin of shared memory: same surface, same queues and losses, no files. For tests and the embedded
-//! feed. In: frames of [`MemoryLink`]s. Out: what a [`MemoryServer`] publishes.
+//! The in-process counterpart of shared memory: same interface, same queues and losses, no files. For tests, and for
+//! programs that embed the daemon. In: frames of [`MemoryLink`]s. Out: what a [`MemoryServer`] publishes.
 //!
-//! A [`Hub`] is what the files are for shared memory: it outlives servers and clients, and holds one server at most.
+//! A [`Hub`] corresponds to the files of shared memory: it outlives servers and clients, and has one server at most.
 
 mod link;
 mod server;
@@ -21,14 +21,14 @@ use crate::wire::{
     RegionRow, RequestHeader, TickRow, TransformRow, TransformVelRow, VertexHeader, VertexRow,
 };
 
-/// Frames of one source that wait for the daemon; then the oldest goes. As over shared memory.
+/// Frames of one source that wait for the daemon; beyond that the oldest is dropped. As over shared memory.
 const SOURCE_BUFFER: usize = 4;
-/// Vertex messages of one source that wait for the daemon; then the oldest goes. As over shared memory.
+/// Vertex messages of one source that wait for the daemon; beyond that the oldest is dropped. As over shared memory.
 const VERTEX_BUFFER: usize = 64;
-/// Messages that wait for one reader; then the oldest goes. As over shared memory.
+/// Messages that wait for one reader; beyond that the oldest is dropped. As over shared memory.
 const RESULT_BUFFER: usize = 8;
 
-/// Where one server and its clients meet.
+/// Connects one server with its clients.
 #[derive(Clone, Debug, Default)]
 pub struct Hub {
     shared: Arc<Shared>,
@@ -42,7 +42,7 @@ struct Shared {
 }
 
 impl Shared {
-    /// A thread that panicked while it held the state left a whole state: every change is one step.
+    /// A thread that panicked while it held the lock left a consistent state: every change is one step.
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -68,7 +68,7 @@ struct Peer {
     pairs: VecDeque<Message<PairRow>>,
     changes: VecDeque<Message<PairRow, ChangesHeader>>,
     contact_changes: VecDeque<Message<ContactRow, ChangesHeader>>,
-    /// It came to one of these two, and has not been seen there yet.
+    /// It subscribed to one of these two, and the server has not noticed yet.
     changes_anew: bool,
     contacts: VecDeque<Message<ContactRow>>,
     regions: VecDeque<Message<RegionRow>>,
@@ -79,7 +79,7 @@ struct Peer {
     answers: VecDeque<(AnswerHeader, Vec<u8>)>,
 }
 
-/// The newest of each message, for late joiners; gone with its server.
+/// The newest of each message, for late joiners; dropped with its server.
 #[derive(Debug, Default)]
 struct Newest {
     hello: Option<Hello>,
@@ -104,7 +104,7 @@ struct State {
     asked: BTreeMap<RequestToken, (u64, u64)>,
 }
 
-/// Queues a message; beyond the reader's buffer the oldest goes.
+/// Queues a message; beyond the reader's buffer the oldest is dropped.
 fn queue<T>(queue: &mut VecDeque<T>, message: T) {
     if queue.len() == RESULT_BUFFER {
         queue.pop_front();

@@ -16,7 +16,7 @@ use crate::wire::{
     TickRow, Undelivered, WIRE_VERSION,
 };
 
-/// The daemon's side of a [`Hub`]; the hub is free again when it is dropped.
+/// The daemon's side of a [`Hub`]; dropping it frees the hub.
 #[derive(Debug)]
 pub struct MemoryServer {
     shared: Arc<Shared>,
@@ -25,13 +25,13 @@ pub struct MemoryServer {
     frame_rows_max: usize,
     drained_ns: Option<u64>,
     demand: Demand,
-    /// Somebody came to `changes` or `contact_changes` since they were last whole.
+    /// A client subscribed to `changes` or `contact_changes` since these were last sent whole.
     changes_owed: bool,
     next_token: u64,
 }
 
 impl MemoryServer {
-    /// Takes the hub and says hello.
+    /// Takes the hub and sends hello.
     ///
     /// # Errors
     /// `Error::Refused` when the hub has a server.
@@ -65,7 +65,7 @@ impl MemoryServer {
         })
     }
 
-    /// Frames of more rows are refused.
+    /// Sets the largest frame; frames with more rows are refused.
     #[must_use]
     pub fn with_frame_rows_max(mut self, rows: usize) -> Self {
         self.frame_rows_max = rows;
@@ -87,7 +87,7 @@ impl MemoryServer {
                 newest.$topic = Some(message);
             };
         }
-        // No newest one is kept: it says nothing without those before it.
+        // The newest message is not kept: it is useless without those before it.
         macro_rules! send_new {
             ($topic:ident, $header:expr, $rows:expr) => {
                 let message = Message {

@@ -1,4 +1,4 @@
-//! What tests of those who listen begin with. Out: a server and its client in memory; ticks under way.
+//! Setup for tests of readers. Out: a server and its client in memory; ticks in progress.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ pub(crate) fn met() -> (MemoryServer, Client) {
     (server, client)
 }
 
-/// What is told of a tick of [`met`]'s server that has not ended.
+/// The announcement of a tick of [`met`]'s server that has not ended.
 pub(crate) fn under_way(number: u64) -> TickRow {
     let mut tick = TickRow::default();
     (tick.header.boot_id, tick.header.tick) = (7, number);

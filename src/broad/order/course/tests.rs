@@ -1,4 +1,4 @@
-//! What steps tell of those to come.
+//! How steps predict those to come.
 
 use super::*;
 use crate::builtin::Random;
@@ -8,7 +8,7 @@ fn at([x, y, z]: [f32; 3]) -> Down {
     Down::of([x, y, z, x + 1.0, y + 1.0, z + 1.0])
 }
 
-/// Three ticks of 16 bodies that step by 0.1 at most: each twice as before, or in a direction drawn anew.
+/// Three ticks of 16 bodies that step by 0.1 at most: either twice the same step, or in random directions.
 fn run(course: &mut Course, random: &mut Random, alike: bool) {
     #[allow(clippy::cast_possible_truncation, reason = "any step will do")]
     let mut step = || [(); 3].map(|()| random.range(-0.1, 0.1) as f32);
@@ -20,7 +20,7 @@ fn run(course: &mut Course, random: &mut Random, alike: bool) {
     let mut before = [at([5.0; 3]); WIDTH];
     let then = steps.map(|[first, _]| at(add([5.0; 3], first)));
     let mut now = steps.map(|[first, second]| at(add(add([5.0; 3], first), second)));
-    // Who came has no place before, and who has no end none at all.
+    // A body that just came has no place before, and an infinite one none at all.
     before[3] = Down::EMPTY;
     now[7].faces[1] = f32::NEG_INFINITY;
     course.clear();
@@ -35,7 +35,7 @@ fn run(course: &mut Course, random: &mut Random, alike: bool) {
 fn steps_without_a_direction_widen_every_side_by_the_root_of_their_number() {
     let (mut course, mut random) = (Course::default(), Random::new(1));
     let (before, now) = (at([0.0; 3]), at([0.1, 0.0, 0.0]));
-    // Ahead, and behind.
+    // How far the box is swept ahead, and behind.
     let far = |course: &Course, ticks| {
         let swept = course.reach(ticks).sweep(&before, &now).corners();
         [swept[3] - 1.1, 0.1 - swept[0]]
@@ -47,7 +47,7 @@ fn steps_without_a_direction_widen_every_side_by_the_root_of_their_number() {
     let ([ahead, behind], [four, _]) = (far(&course, 16), far(&course, 4));
     assert!(course.wanders && (ahead - behind).abs() < 1e-4);
     assert!(((ahead - PAD) / (four - PAD) - 2.0).abs() < 1e-3);
-    // The mean of its own step and those of all, which are shorter.
+    // Mean of its own step and those of all, which are shorter.
     assert!((0.2..0.4).contains(&(ahead / WANDER)), "{ahead}");
     run(&mut course, &mut random, true);
     assert!(!course.wanders);
@@ -56,7 +56,8 @@ fn steps_without_a_direction_widen_every_side_by_the_root_of_their_number() {
 #[test]
 fn along_an_axis_that_parts_few_neighbours_boxes_are_swept_both_ways() {
     let mut course = Course::default();
-    // Two blocks of neighbours far from each other in all but height; height alone may part every fourth of them.
+    // Two blocks of neighbours far from each other in all axes except height; height alone separates every fourth of
+    // them.
     for high in [0.5_f32, 1.5] {
         course.clear();
         let place = |block: f32, lane: usize| {
@@ -102,8 +103,8 @@ fn a_few_and_those_at_rest_tell_nothing() {
     course.watch(u16::MAX, &rests);
     course.note(0, u16::MAX, &rests, &rests);
     course.close();
-    // These go on, but seven are too few: the others were not watched, or have another body's lane; and of a block
-    // that was not watched nothing is known.
+    // These keep their course, but seven are too few: the others were not watched, or another body has their lane; and
+    // a block that was not watched has no data.
     course.watch(0xFF, &rests);
     course.forget(0, 3);
     let [then, now] = [1.0, 2.0].map(|x| [at([x; 3]); WIDTH]);
@@ -124,7 +125,7 @@ fn who_rests_is_not_padded_for_those_who_wander_and_who_hardly_moves_by_little()
         step: 0.1,
         ..Course::default()
     };
-    // A floor a thousand times as large as what trembles on it.
+    // A floor a thousand times as large as the bodies that vibrate on it.
     let floor = |x: f32| Down::of([x, 0.0, 0.0, x + 1000.0, 1000.0, 1000.0]);
     let padded = |x: f32| {
         let swept = wanders.reach(16).sweep(&floor(0.0), &floor(x)).corners();

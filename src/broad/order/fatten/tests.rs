@@ -1,4 +1,5 @@
-//! Goal: fat boxes hold what moves as it did, and are no wider than they must. Method: one body, tick by tick.
+//! Goal: fat boxes hold bodies that keep moving as before, and are no wider than needed. Method: one body, tick by
+//! tick.
 
 use super::*;
 use crate::simd::boxes::Portable;
@@ -36,7 +37,7 @@ fn a_body_that_flies_straight_stays_in_its_box_for_the_horizon() {
 fn a_body_that_moves_now_and_then_stays_in_its_box_for_as_many_moves() {
     let (mut gait, mut held, mut renewals) = (Gait::NEW, Hold::EMPTY, 0);
     for step in 0..160_u32 {
-        // All move in each hundredth tick, and this one in others of its own.
+        // All move in each hundredth tick, and this body also in the ticks between.
         let (beat, now) = (1000 + step / 100, shifted(0.02 * step as f32));
         if step % 100 != 0 {
             gait.note_move();
@@ -76,11 +77,11 @@ fn a_body_at_rest_keeps_to_the_places_that_it_has_been_at() {
             assert!(holds(&held.fat, &now) && holds(&now, &held.core));
         }
     }
-    // It spans 0.008; a margin on either side of a place would have to be as much.
+    // It spans 0.008; a margin on either side of a place would have to be as large.
     let span = held.core.faces[0] - held.fat.faces[0];
     assert!(late <= 2 && span < 0.014, "{late} {span}");
     assert!(!gait.leaves(Portable, &shifted(0.003), &held, 2016, HORIZON));
-    // Off it goes: it is followed again.
+    // It moves off, and is swept again.
     let mut renewals = 0;
     for tick in 2000..2100_u32 {
         let now = shifted(0.02 * (tick - 1999) as f32);
@@ -138,7 +139,7 @@ fn infinite_boxes_are_their_own() {
     assert_eq!(held.fat.corners(), all.corners());
 }
 
-/// The places of a body that trembles by so much about a unit cube's place.
+/// The places of a body that vibrates by up to `by` around a unit cube's place.
 fn trembles(by: f32) -> impl Fn(u32) -> Down {
     move |tick| {
         let mixed = tick.wrapping_mul(2_654_435_761).wrapping_add(977) >> 8;
@@ -146,7 +147,7 @@ fn trembles(by: f32) -> impl Fn(u32) -> Down {
     }
 }
 
-/// The least and the greatest faces of some places.
+/// The least and the greatest position of each face.
 fn seen(places: impl Iterator<Item = Down>) -> Hold {
     let mut seen = Hold {
         fat: NO_CORE,
@@ -185,7 +186,7 @@ fn who_was_seen_far_about_or_not_at_all_is_not_held_to_it() {
     let far = seen((0..16).map(trembles(0.1)));
     assert!(hold_of_seen(&far, [0.0; 3], 0.01).is_lost());
     assert!(hold_of_seen(&seen(std::iter::empty()), [0.0; 3], 0.01).is_lost());
-    // Seen from another origin.
+    // Observed from another origin.
     let near = hold_of_seen(
         &seen((0..16).map(trembles(0.004))),
         [10.0, 20.0, -30.0],
@@ -209,7 +210,7 @@ fn a_wide_floor_has_a_margin_as_its_thickness_and_a_sheet_without_any_still_has_
         let held = gait.renew(plate, 0, HORIZON, &Hold::EMPTY);
         plate.faces[6] - held.fat.faces[6]
     };
-    // It was three hundredths of a metre: nobody who stood on it was sure of it.
+    // It was three hundredths of a metre: no body standing on it was a certain pair.
     assert!((1e-4..2e-3).contains(&margin(&plate(50.0, 1.0))));
     assert!((1e-4..2e-3).contains(&margin(&plate(50.0, 0.0))));
 }
@@ -248,7 +249,7 @@ fn a_body_that_was_pushed_and_rests_again_is_held_tight_again_and_one_that_rests
 fn a_body_that_has_calmed_forgets_the_margin_of_its_way() {
     let (mut gait, mut held) = (Gait::NEW, Hold::EMPTY);
     let (mut tick, mut width) = (0, f32::INFINITY);
-    // It bounces about; then it stands.
+    // It bounces about, then stands still.
     for now in (0..60)
         .map(|t| shifted(if t % 3 == 0 { 0.1 } else { -0.1 }))
         .chain((0..600).map(|_| shifted(0.0)))

@@ -1,4 +1,4 @@
-//! Goal: the way that costs less is taken, and trials of the other are rare. Method: counted work told tick by tick.
+//! Goal: the cheaper mode is used, and trials of the other are rare. Method: counted work is fed tick by tick.
 
 use super::*;
 
@@ -10,7 +10,7 @@ fn work(tests: u64, renewed: u64) -> Work {
     }
 }
 
-/// Runs ticks in which all of 1,000 bodies move; returns how many were worked without candidates.
+/// Runs ticks in which all of 1,000 bodies move; returns how many worked without candidates.
 fn run(gear: &mut Gear, on: &mut bool, ticks: u32, work: &Work) -> u32 {
     let mut scratch = 0;
     for _ in 0..ticks {
@@ -31,13 +31,13 @@ fn motion_that_no_box_holds_is_worked_from_scratch_but_for_ever_rarer_trials() {
     assert!(run(&mut gear, &mut on, 40, &wild) >= 1);
     assert_eq!(gear.cause, BroadCause::Spell);
     assert!(run(&mut gear, &mut on, 10_000, &wild) > 9_700);
-    // It has calmed: a trial finds that out and stays.
+    // It has calmed: a trial detects that, and candidates stay.
     let calm = work(500, 5);
     run(&mut gear, &mut on, SPELL_MAX + 1, &calm);
     assert_eq!(run(&mut gear, &mut on, 1000, &calm), 0);
 }
 
-/// Gives up candidates that renewed 900 boxes a tick of 1,000 bodies.
+/// Gives up candidates that renewed 900 boxes per tick of 1,000 bodies.
 fn given_up() -> Gear {
     let (mut gear, wild) = (Gear::default(), work(10_000, 900));
     while !gear.choose(false, 1000, 1000, (300, 0)) {
@@ -47,7 +47,7 @@ fn given_up() -> Gear {
     gear
 }
 
-/// Ticks without candidates, as many as asked for or until a trial; what probes come to is told. Returns how many
+/// Runs ticks without candidates, at most `most` or until a trial, and feeds probe results. Returns how many probes
 /// began, their ticks, and whether a trial came.
 fn spell(gear: &mut Gear, most: u32, escapes: u64, crowd: u64) -> (u32, u32, bool) {
     let (mut begun, mut ticks) = (0, 0);
@@ -74,7 +74,7 @@ fn candidates_are_not_tried_again_on_the_footing_that_they_were_given_up_on() {
     assert_eq!(spell(&mut gear, SPELL_LONG, 400, 2000), two);
     let ten = (10, 10 * PROBE_TICKS, false);
     assert_eq!(spell(&mut gear, 10 * SPELL_MIN, 350, 2500), ten);
-    // Calmer, or another crowd.
+    // Calmer, or another density.
     for (escapes, crowd) in [(290, 2000), (400, 1400), (400, 2700)] {
         let mut other = gear;
         assert!(
@@ -82,7 +82,7 @@ fn candidates_are_not_tried_again_on_the_footing_that_they_were_given_up_on() {
             "{escapes} {crowd}"
         );
     }
-    // Nor are they given up for ever.
+    // They are not given up for ever.
     let rest = (VAIN_MAX - 11) * SPELL_MIN;
     assert!(!spell(&mut gear, rest, 400, 2000).2);
     assert!(spell(&mut gear, SPELL_MIN, 400, 2000).2);
@@ -132,7 +132,7 @@ fn bug_what_a_world_without_bodies_cost_is_no_measure_for_those_that_come() {
             gear.note_scratch(0, cost);
             on = gear.choose(on, 0, 0, (0, 0));
         }
-        // Those that tremble are left to candidates, and those that no box holds are not.
+        // Vibrating bodies get candidates, and those that no fat box holds do not.
         let mut wild = gear;
         assert_eq!(run(&mut gear, &mut on, 500, &work(500, 5)), 0, "{cost}");
         assert!(
@@ -148,13 +148,13 @@ fn motion_that_boxes_hold_is_never_worked_from_scratch() {
     assert_eq!(run(&mut gear, &mut on, 5_000, &work(500, 5)), 0);
 }
 
-/// Ticks of many bodies that all move, from the first; those in a probe are told that so many of 1,024 escape. Returns
-/// the first tick with candidates, or as many as there were.
+/// Ticks of many bodies that all move, from the first; probes report `escapes` of 1,024. Returns the first tick with
+/// candidates, or `ticks`.
 fn begin(ticks: u32, escapes: u64) -> u32 {
     let (mut gear, mut on, mut looks) = (Gear::default(), false, 0);
     let bodies = FAR + 1;
     for tick in 0..ticks {
-        // Who came is not told as moved.
+        // Bodies that came are not listed as moved.
         let moved = if tick == 0 { 0 } else { bodies };
         on = gear.choose(on, moved, bodies, (0, 0));
         if !on {
@@ -177,7 +177,7 @@ fn begin(ticks: u32, escapes: u64) -> u32 {
 fn many_bodies_begin_without_candidates_and_get_them_where_few_escape() {
     assert_eq!(begin(SPELL_MIN, FIRST_ESCAPES + 1), SPELL_MIN);
     assert_eq!(begin(SPELL_MIN, FIRST_ESCAPES), FIRST_TICKS);
-    // Those that stand still get them at once, and few bodies begin with them.
+    // If bodies stand still they get candidates at once, and few bodies begin with them.
     let mut gear = Gear::default();
     assert!(gear.choose(false, 0, FAR + 1, (0, 0)));
     assert!(!gear.choose(true, 0, FAR + 1, (0, 0)));

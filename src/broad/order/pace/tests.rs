@@ -1,12 +1,12 @@
-//! Goal: lists last as long as costs least, and are let go where they do not pay. Method: counted work told tick by
+//! Goal: lists last as long as costs least, and are dropped where they do not pay. Method: counted work is fed tick by
 //! tick.
 
 use super::*;
 
 const BODIES: usize = 1000;
 
-/// Lists in turn; a search costs `tests`, and a tick so many entries for each tick that boxes are swept for.
-/// Returns how long the last ones were in use, and whether lists go on.
+/// Lists in sequence; a search costs `tests`, and a tick has `entries` for each tick that boxes are swept for. Returns
+/// how long the last ones were in use, and whether lists go on.
 fn run(pace: &mut Pace, tests: u64, entries: u64, lists: u32) -> (u32, bool) {
     pace.note_list(tests);
     for _ in 0..lists {
@@ -30,12 +30,12 @@ fn run(pace: &mut Pace, tests: u64, entries: u64, lists: u32) -> (u32, bool) {
 
 #[test]
 fn a_list_is_in_use_for_as_many_ticks_as_cost_least() {
-    // A search of 12 000 over n ticks, and 480 n in each: least at five.
+    // A search of 12,000 over n ticks, and 480 n in each: minimal at five.
     let mut pace = Pace::default();
     pace.begin(4000 * MEET);
     let (ticks, on) = run(&mut pace, 1000, 120, 40);
     assert!((4..=8).contains(&ticks) && on, "{ticks}");
-    // With cheaper entries longer.
+    // With cheaper entries it is longer.
     let (ticks, on) = run(&mut pace, 1000, 10, 40);
     assert!((12..=TICKS_MAX).contains(&ticks) && on, "{ticks}");
 }
@@ -73,7 +73,7 @@ fn the_next_list_is_made_in_the_last_ticks_of_the_one_in_use() {
     assert_eq!(makes[0], (Phase::Opens, 10));
     assert_eq!(makes[1..4], made);
     assert_eq!(makes[4..], [(Phase::Ends, 6)]);
-    // Its boxes hold to the end of the list that takes over now.
+    // Its boxes last to the end of the list that takes over now.
     pace.note_list(1000);
     pace.note_tick(10, 0, BODIES);
     assert_eq!((pace.phase(), pace.span(false)), (Phase::Lasts, 5));
@@ -90,13 +90,13 @@ fn lists_that_do_not_pay_are_tried_ever_more_seldom() {
         rests.push(1 + (0..).take_while(|_| !pace.begins(0, 1000 * MEET)).count());
     }
     assert_eq!(rests, [64, 256, 1024, 2048]);
-    // One that pays again starts from the beginning.
+    // After a list that pays, rests start from the beginning.
     pace.begin(4000 * MEET);
     assert!(run(&mut pace, 1000, 10, 4).1);
     let mut broken = pace;
     pace.fail();
     assert_eq!(pace.rest, REST_MIN);
-    // One that was broken off is tried again before, if it had paid.
+    // One that was broken off is tried again sooner, if it had paid.
     broken.break_off();
     assert_eq!(broken.rest, REST_BROKEN);
     broken.begin(4000 * MEET);
@@ -109,7 +109,7 @@ fn a_crowd_of_overlaps_is_not_listed() {
     let mut pace = Pace::default();
     assert!(!pace.begins(2000, 1000 * MEET) && pace.nears());
     assert!(!pace.begins(10_000, 1000 * MEET) && pace.begins(2000, 1000 * MEET));
-    // What turns out to be one is let go in the next tick.
+    // A list that turns out too large is dropped in the next tick.
     pace.begin(1000 * MEET);
     pace.note_list(1000);
     pace.note_tick(100_000, 0, BODIES);

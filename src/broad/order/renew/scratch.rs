@@ -1,26 +1,26 @@
-//! What the queries of renewed bodies write down on their way.
+//! Scratch data of the queries of renewed bodies.
 
 use crate::broad::order::NONE;
 use crate::broad::order::links::room;
 use crate::simd::boxes::WIDTH;
 
-/// Memory of the queries, kept over ticks.
+/// Memory of the queries, kept across ticks.
 #[derive(Clone, Debug, Default)]
 pub(in crate::broad::order) struct Scratch {
     /// Blocks that a query found.
     pub(super) near: Vec<u32>,
-    /// Those of them that are looked into.
+    /// Those of them that are compared.
     pub(super) close: Vec<Close>,
-    /// Records of the block at hand: the other block, the record.
+    /// Records of the current block: the other block, the record.
     pub(super) have: Vec<(u32, u32)>,
-    /// By block: the stamp of the query that met it last, and its record with the asking block.
+    /// By block: the stamp of the last query that met it, and its record with the querying block.
     pub(super) mark: Vec<(u32, u32)>,
     pub(super) stamp: u32,
 }
 
 impl Scratch {
-    /// The stamp of a query for blocks with a record; the one after it is for those of them that it met. Those of the
-    /// last round are forgotten before they come again.
+    /// The stamp of a query for blocks with a record; the stamp after it is for those of them that it met. After a
+    /// wrap-around old stamps are cleared.
     pub(super) fn next_stamp(&mut self) -> u32 {
         self.stamp = self.stamp.wrapping_add(2);
         if self.stamp == 0 {
@@ -30,7 +30,7 @@ impl Scratch {
         self.stamp
     }
 
-    /// Room for a query that meets every block.
+    /// Reserves memory for a query that meets every block.
     pub(in crate::broad::order) fn reserve(&mut self, blocks: usize) {
         room(&mut self.near, blocks + WIDTH);
         room(&mut self.close, blocks);
@@ -39,13 +39,13 @@ impl Scratch {
     }
 }
 
-/// A block to be looked into.
+/// A block to compare.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Close {
     pub(super) block: u32,
-    /// Its record with the asking block, or `NONE`.
+    /// Its record with the querying block, or `NONE`.
     pub(super) record: u32,
-    /// Renewed lanes of the asking block that meet its bound.
+    /// Renewed lanes of the querying block that meet its bound.
     pub(super) lanes: u16,
 }
 

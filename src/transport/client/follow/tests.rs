@@ -1,4 +1,4 @@
-//! Ticks and messages of several boots in any order, and ticks without an end.
+//! Ticks and messages of several boots in any order, and endless ticks.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -114,7 +114,7 @@ fn bug_a_look_at_what_is_there_never_ended_where_ticks_came_faster_than_they_wer
     let clock = Arc::new(ManualClock::new(1));
     let mut client = Client::over(Box::new(queues), clock, None, 1).unwrap();
     assert_eq!(client.latest().unwrap(), Heard::Tick);
-    // More than wait in any queue.
+    // More than any queue holds.
     assert!(client.view().tick().header.tick > 8);
 }
 
@@ -156,7 +156,7 @@ fn bug_a_message_of_a_boot_without_a_tick_held_up_all_behind_it() {
         assert_eq!(follow.view.pairs().is_none(), waits, "tick {at}");
         assert_eq!(follow.view.list().is_none(), waits, "tick {at}");
     }
-    // One of the next boot waits for its tick, which the last ticks of this one come before.
+    // A message of the next boot waits for its tick, while the last ticks of this one come first.
     queues.pairs.push_back((4, 1));
     for at in 60..65 {
         queues.ticks.push_back(tick(3, at, at));
@@ -174,7 +174,7 @@ fn bug_a_message_of_a_boot_without_a_tick_held_up_all_behind_it() {
 #[test]
 fn bug_rows_of_a_long_tick_were_handed_out_beside_what_was_told_of_it_and_again_with_its_end() {
     let (mut follow, mut queues) = (Follow::default(), Queues::default());
-    // All of it is there before the first look.
+    // All of it is there before the first read.
     for (number, sent_ns) in [(1, 10), (2, 20), (2, 30), (2, 40)] {
         let mut row = tick(7, number, sent_ns);
         if (20..40).contains(&sent_ns) {

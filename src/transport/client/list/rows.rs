@@ -13,19 +13,19 @@ pub trait Rows: Debug + Default {
     /// A row of its message.
     type Row: Debug + Default + Clone + Copy + PartialEq;
 
-    /// Forgets all.
+    /// Removes all rows.
     fn clear(&mut self);
     /// Applies the rows of a tick.
     fn take(&mut self, tick: u64, rows: &[Self::Row]);
-    /// How many there are.
+    /// Number of rows.
     fn len(&self) -> usize;
     /// The next message.
     fn read(link: &mut dyn Link, into: &mut Message<Self::Row, ChangesHeader>) -> Result<bool>;
-    /// Opens the port of the message anew.
+    /// Opens the port of the message again.
     fn renew(link: &mut dyn Link) -> Result<()>;
 }
 
-/// Of each pair that is listed the tick that sent its row, and the row.
+/// By listed pair: the tick that sent its row, and the row.
 #[derive(Clone, Debug, Default)]
 pub struct Pairs(BTreeMap<(u64, u64), (u64, PairRow)>);
 
@@ -76,7 +76,7 @@ impl Rows for Pairs {
     }
 }
 
-/// Of each pair that has some its contacts, and how many all have.
+/// By pair: its contacts; and the total number of contacts.
 #[derive(Clone, Debug, Default)]
 pub struct Contacts {
     pairs: BTreeMap<(u64, u64), Vec<ContactRow>>,

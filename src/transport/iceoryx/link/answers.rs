@@ -1,4 +1,4 @@
-//! Answers to a client's requests, and to those that no daemon will answer.
+//! Answers to a client's requests, including those that no daemon will answer.
 
 use iceoryx2::pending_response::PendingResponse;
 
@@ -10,15 +10,15 @@ use crate::wire::{AnswerHeader, RequestHeader, WIRE_VERSION};
 /// A request that waits for its answer.
 pub(super) type Pending = PendingResponse<Ipc, [u8], RequestHeader, [u8], AnswerHeader>;
 
-/// The next answer to any of these, its JSON in `into`. One that its daemon has let go of without an answer is refused
-/// here: its asker would wait for as long as it has patience.
+/// The next answer to any of these, its JSON in `into`. A request that its daemon dropped without an answer is refused
+/// here: the client would otherwise wait until its time-out.
 pub(super) fn next_answer(
     pending: &mut Vec<Pending>,
     into: &mut Vec<u8>,
 ) -> Result<Option<AnswerHeader>> {
     for at in 0..pending.len() {
         let Some(one) = pending.get(at) else { break };
-        // Before it is looked for: no answer is sent after a request was let go of.
+        // Checked before receiving: no answer is sent after a request was dropped.
         let is_open = one.is_connected();
         into.clear();
         let header = if let Some(response) = one.receive().map_err(|e| failed("answer", e))? {

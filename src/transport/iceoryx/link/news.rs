@@ -1,4 +1,4 @@
-//! The port of `changes` or `contact_changes`, which is opened anew where a message was missed.
+//! The port of `changes` or `contact_changes`, which is opened again when a message was missed.
 
 use std::fmt::Debug;
 
@@ -13,11 +13,11 @@ use crate::transport::iceoryx::qos::{self, Ipc, Open, PubSub, failed};
 use crate::transport::iceoryx::unmet::Unmet;
 use crate::wire::ChangesHeader;
 
-/// A port, where it is listened to.
+/// A port, if it is subscribed.
 pub(super) struct News<T: Debug + ZeroCopySend + 'static> {
     topic: &'static str,
     reader: Reader<T, ChangesHeader>,
-    /// Its place went to another reader when it was to be renewed.
+    /// Its place went to another reader when it was to be opened again.
     pub(super) owed: bool,
 }
 
@@ -45,15 +45,15 @@ impl<T: Debug + ZeroCopySend + Copy + 'static> News<T> {
         Ok(())
     }
 
-    /// Opens it anew where it is open, or was before its place went; returns whether it is.
+    /// Opens it again if it is open, or was before its place was lost; returns whether it is open now.
     pub(super) fn renew(&mut self, spot: &Spot) -> Result<bool> {
         let service = match self.service(spot) {
-            // while no daemon is there all stays as it is
+            // Without a daemon everything stays as it is.
             Err(e) if qos::is_away(&e) => return Ok(false),
             service => service?,
         };
-        // First the old one, which takes a reader's place. The service is held meanwhile: while a daemon starts anew
-        // nobody else may hold it, and who lets it go last takes it along.
+        // The old one goes first, since it takes a reader's place. The service is held meanwhile: while a daemon
+        // restarts there may be no other holder, and the last one to release it removes it.
         self.owed |= self.reader.take().is_some();
         if self.owed {
             self.listen(&service, spot)?;

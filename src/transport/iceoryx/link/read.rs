@@ -1,4 +1,4 @@
-//! Reading what a daemon sends: a message is copied out of shared memory, its count checked before.
+//! Reading messages of a daemon: a message is copied out of shared memory after its length was checked.
 
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{PayloadHeader, ZeroCopySend};
@@ -8,10 +8,10 @@ use crate::transport::client::Message;
 use crate::transport::iceoryx::qos::{Ipc, failed};
 use crate::wire::MessageHeader;
 
-/// A port for one kind of message, where it is listened to.
+/// A port for one kind of message, if it is subscribed.
 pub(super) type Reader<T, H = MessageHeader> = Option<Subscriber<Ipc, [T], H>>;
 
-/// The next message; those of more than `rows_max` rows are passed over.
+/// The next message; those of more than `rows_max` rows are skipped.
 pub(super) fn read<T, H>(
     reader: &Reader<T, H>,
     rows_max: usize,
@@ -25,7 +25,7 @@ where
         return Ok(false);
     };
     while let Some(sample) = reader.receive().map_err(|e| failed("result", e))? {
-        // the count is the sender's word: checked before it makes a slice
+        // The count comes from the sender: it is checked before it makes a slice.
         let rows = usize::try_from(sample.header().number_of_elements());
         if rows.is_ok_and(|rows| rows <= rows_max) {
             into.header = *sample.user_header();

@@ -1,4 +1,4 @@
-//! Sending: rows are copied into shared memory under their header.
+//! Sending: rows are copied into shared memory with their header.
 
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::prelude::ZeroCopySend;
@@ -6,7 +6,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use crate::error::Result;
 use crate::transport::iceoryx::qos::{Ipc, failed};
 
-/// One message.
+/// Sends one message.
 pub(super) fn send_frame<T, H>(
     publisher: &Publisher<Ipc, [T], H>,
     header: &H,

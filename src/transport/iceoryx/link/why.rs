@@ -1,4 +1,4 @@
-//! Why a client has no ports. In: what iceoryx2 said, and how the process stands. Out: an error that names the cause.
+//! Why a client has no ports. In: iceoryx2's error, and the state of the process. Out: an error that names the cause.
 
 use std::time::Duration;
 
@@ -14,12 +14,13 @@ use crate::transport::iceoryx::qos::{Ipc, is_away};
 use crate::transport::open_files::OpenFiles;
 use crate::wire::Hello;
 
-/// Between two looks for a hello.
+/// Time between two checks for a hello.
 const LOOK: Duration = Duration::from_millis(10);
-/// So many looks: a daemon that nothing wakes sees who came each heartbeat, by default each tenth of a second.
+/// Number of checks: without a wake-up a daemon notices a new client at each heartbeat, by default each tenth of a
+/// second.
 const LOOKS: u32 = 30;
 
-/// Why there is no daemon to talk to, with both versions where the holder of the instance says another one.
+/// The error when no daemon is found; with both versions if the holder of the instance has another one.
 pub(super) fn not_found(place: &Place, why: &Error) -> Error {
     crowded(why).unwrap_or_else(|| of_holder(place, lock::holder(place).as_ref(), why))
 }
@@ -61,8 +62,8 @@ fn of_holder(place: &Place, holder: Option<&Holder>, why: &Error) -> Error {
     ))
 }
 
-/// Why a daemon's topics are not there: those of another wire version have other names, and only the hello is that of
-/// every version.
+/// The error when a daemon's topics do not exist: those of another wire version have other names, and only the hello is
+/// common to every version.
 pub(super) fn of_another_version(hello: &Subscriber<Ipc, Hello, ()>, why: Error) -> Error {
     if !is_away(&why) {
         return why;
@@ -76,7 +77,7 @@ pub(super) fn of_another_version(hello: &Subscriber<Ipc, Hello, ()>, why: Error)
     why
 }
 
-/// What keeps this process from opening ports; `None`: not its open files.
+/// The error if this process has too few open files left; `None`: there are enough.
 pub(super) fn out_of_files() -> Option<Error> {
     let files = OpenFiles::own().filter(|files| files.left() < 2 * FILES_A_CLIENT)?;
     Some(Error::Refused(format!(
@@ -90,10 +91,10 @@ pub(super) fn opened<T>(port: Result<T>) -> Result<T> {
     port.map_err(|e| out_of_files().or_else(|| crowded(&e)).unwrap_or(e))
 }
 
-/// What keeps a client from a port that others have all places of; `None`: not that.
+/// The error if all places of a port are taken by others; `None`: another cause.
 fn crowded(why: &Error) -> Option<Error> {
     let why = why.to_string();
-    // Of each kind of port it is another type.
+    // Each kind of port has its own error type.
     why.contains("::ExceedsMax").then(|| {
         Error::Refused(format!(
             "every place is taken ({why}): end a client that is not needed (`sweepd list` counts them, msgs/README.md has \

@@ -1,4 +1,5 @@
-//! Requests in, answers out. A request is checked for its frame (version, lengths) here, for its meaning elsewhere.
+//! Requests in, answers out. Only a request's form (version, lengths) is checked here; its meaning is checked
+//! elsewhere.
 
 use iceoryx2::prelude::PayloadHeader;
 
@@ -7,21 +8,21 @@ use crate::error::Result;
 use crate::transport::request::{refusal, unreadable};
 use crate::wire::WIRE_VERSION;
 
-/// Most bytes that one look at the requests copies: some 0.1 ms. All of the largest request took 150 ms and more, and
-/// frames that wait for so long are taken for old ones.
+/// Most bytes copied by one check for requests: some 0.1 ms. All of the largest request took 150 ms and more, and
+/// frames that wait that long count as old.
 const COPIED_MAX: usize = 1 << 18;
 
-/// Requests that are on their way in.
+/// Requests that are being received.
 #[derive(Default)]
 pub(super) struct Arrivals {
-    /// The one of which a part is copied.
+    /// A request that is copied in part.
     part: Option<(Asked, Vec<u8>)>,
-    /// The last look ended before all was copied.
+    /// The last check ended before all was copied.
     is_more: bool,
 }
 
 impl Arrivals {
-    /// Whether there is more to copy than was.
+    /// Returns whether there is more to copy.
     pub(super) fn is_more(&self) -> bool {
         self.is_more
     }
@@ -55,7 +56,7 @@ impl Server {
         self.arrivals.is_more = true;
     }
 
-    /// The next request that can be read, with memory for its payload.
+    /// The next readable request, with memory for its payload.
     fn next_request(&mut self) -> Option<(Asked, Vec<u8>)> {
         loop {
             let request = match self.answers.receive() {
@@ -65,7 +66,7 @@ impl Server {
                     return None;
                 }
             };
-            // the count is the sender's word: checked before it makes a slice
+            // The count comes from the sender: it is checked before it makes a slice.
             let len = usize::try_from(request.header().number_of_elements()).unwrap_or(usize::MAX);
             match unreadable(request.user_header(), len) {
                 None => return Some((request, Vec::with_capacity(len))),

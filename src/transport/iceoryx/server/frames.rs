@@ -1,4 +1,4 @@
-//! Frames in: a fair drain, and the sessions whose node is gone.
+//! Incoming frames: a fair drain, and the sessions whose node is gone.
 
 use std::collections::BTreeMap;
 use std::fmt::Debug;
@@ -17,7 +17,7 @@ use crate::transport::iceoryx::qos::{self, Ipc, Open, failed};
 use crate::transport::iceoryx::unmet::Unmet;
 use crate::wire::{Frame, FrameHeader, Inbox, RejectReason, VertexHeader, VertexRow};
 
-/// Messages that one drain passes over at most where they cannot be read: who floods with such must not hold it up.
+/// Most unreadable messages skipped by one drain: a client that floods with them must not hold it up.
 const LOST_MAX: u64 = 64;
 
 /// One of the services that sources send on. Drop order: samples, then the port, then the service.
@@ -32,13 +32,13 @@ where
     service: PubSub<Ipc, [T], H>,
 }
 
-/// What a drain found: messages, and receives that failed.
+/// Result of a drain: messages, and failed receives.
 struct Drained {
     frames: usize,
     errors: u64,
 }
 
-/// What is the same for every frame of a drain.
+/// Data common to all frames of a drain.
 #[derive(Clone, Copy)]
 struct Stamped {
     now_ns: u64,
@@ -46,7 +46,7 @@ struct Stamped {
 }
 
 impl Stamped {
-    /// A frame of the inbox for what came under this header; its session.
+    /// Adds a frame with this header to the inbox; returns its session.
     fn take<T>(
         self,
         inbox: &mut Inbox,
@@ -118,8 +118,8 @@ where
         })
     }
 
-    /// Hands over what is there, header and rows; no rows where there are more than `rows_max`. The samples stay
-    /// borrowed until [`Self::release`], so that one source gives at most its queue however often this is called.
+    /// Passes on what is there, header and rows; no rows if there are more than `rows_max`. The samples stay borrowed
+    /// until [`Self::release`], so that one source gives at most its queue however often this is called.
     ///
     /// * `take` - yields the session.
     fn drain(
@@ -136,16 +136,16 @@ where
                 Ok(Some(sample)) => {
                     let header = *sample.user_header();
                     let publisher = sample.header().publisher_id().value();
-                    // the count is the sender's word: checked before it makes a slice
+                    // The count comes from the sender: it is checked before it makes a slice.
                     let rows = usize::try_from(sample.header().number_of_elements());
                     let fits = rows.is_ok_and(|rows| rows <= rows_max);
                     let session = take(header, fits.then(|| sample.payload()));
                     sessions.insert(publisher, session);
                     self.kept.push(sample);
                 }
-                // It lies in memory that cannot be mapped, and iceoryx2 drops it without a word; others are behind it.
+                // A sample in memory that cannot be mapped: iceoryx2 drops it silently, and there are others after it.
                 Ok(None) if is_there && errors < LOST_MAX => errors += 1,
-                // every source has given its whole queue: the fair end of a drain
+                // Every source has given its whole queue: the fair end of a drain.
                 Ok(None) | Err(ReceiveError::ExceedsMaxBorrows) => break,
                 Err(_) => {
                     errors += 1;
@@ -165,17 +165,17 @@ where
 impl Server {
     pub(super) fn take_frames(&mut self, inbox: &mut Inbox, clock: &dyn Clock) {
         let now_ns = clock.boottime_ns();
-        // half a heartbeat of slack: a wait that ends at its time-out is not silence
+        // Half a heartbeat of tolerance: a wait that ends at its time-out is not silence.
         let silence_ns = self.options.heartbeat_ns + self.options.heartbeat_ns / 2;
         let waited = self
             .drained_ns
             .is_none_or(|before_ns| now_ns.saturating_sub(before_ns) > silence_ns);
         self.drained_ns = Some(now_ns);
-        // also without a notice: events are lost where a cleaner removed the socket
+        // Also without a notification: events are lost if a cleaner removed the socket.
         let looked_long_ago = now_ns.saturating_sub(self.looked_ns) > self.options.heartbeat_ns;
         if std::mem::take(&mut self.peers_changed) || looked_long_ago {
             self.looked_ns = now_ns;
-            // before the drain, which then has all that those who are gone have sent
+            // Before the drain, which then has everything that gone publishers have sent.
             self.note_gone_publishers();
         }
         let known = self.sessions.len();
@@ -190,8 +190,8 @@ impl Server {
             ..
         } = self;
         let rows_max = options.frame_rows_max;
-        // Two queues, one order: both are read until neither has more, so that whatever a source sent before a frame
-        // that is here is here, too; then they are put in the order of their sending.
+        // Two queues, one order: both are read until neither has more, so that everything a source sent before a
+        // received frame is received too; then all are sorted by send order.
         let (mut poses, mut motions) = (0, 0);
         loop {
             let of_poses = transforms.drain(rows_max, sessions, |header, rows| {
@@ -212,7 +212,7 @@ impl Server {
         if poses > 0 && motions > 0 {
             inbox.sort_by_sending();
         }
-        // After the frames: vertices are sent before the frame that they belong with, so those of what was drained
+        // After the frames: vertices are sent before the frame that they belong to, so those of the frames drained
         // above are there.
         let rows_max = crate::limits::DEFORMING_VERTICES_MAX;
         let of_vertices = vertices.drain(rows_max, sessions, |header, rows| {
@@ -220,7 +220,7 @@ impl Server {
         });
         vertices.release();
         troubles.failed(of_vertices.errors);
-        // who came and left between the look and the drain must be looked at again
+        // Publishers that came and left between the check and the drain must be checked again.
         self.peers_changed |= self.sessions.len() > known;
         self.troubles.tell(now_ns);
         self.end_sessions(inbox);
@@ -261,7 +261,7 @@ impl Server {
             let Some(session) = self.sessions.remove(&publisher) else {
                 continue;
             };
-            // a client may have a port on several services: its session ends with the last
+            // A client may have a port on several services: its session ends with the last.
             if !self.sessions.values().any(|s| *s == session) {
                 inbox.end_session(session);
             }

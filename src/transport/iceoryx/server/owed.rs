@@ -1,12 +1,12 @@
-//! The rows of `pairs` for those whom the one before did not reach.
+//! The rows of `pairs` for readers that did not get the last message.
 
 use std::iter::from_fn;
 
 use crate::wire::PairRow;
 
-/// Puts what is owed in the place of the same pairs' rows, or among them.
+/// Replaces rows of `pairs` by owed rows of the same pairs, and inserts the others.
 ///
-/// * `pairs`, `owed` - by ids. An owed row that says that its pair has left takes that pair's row away.
+/// * `pairs`, `owed` - by ids. An owed row which says that its pair has left removes that pair's row.
 pub(super) fn mended<'a>(
     pairs: &'a [PairRow],
     owed: &'a [PairRow],

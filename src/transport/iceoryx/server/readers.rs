@@ -1,4 +1,4 @@
-//! Who reads `changes` or `contact_changes`: to one who has just come they say nothing until it has the whole list.
+//! The readers of `changes` or `contact_changes`: a new one cannot use them until it has the whole list.
 
 use std::fmt::Debug;
 
@@ -12,13 +12,13 @@ use crate::transport::iceoryx::qos::{self, Open};
 use crate::transport::iceoryx::unmet::Unmet;
 use crate::wire::ChangesHeader;
 
-/// A message of what is new, and who reads it.
+/// A message with changes, and its readers.
 pub(super) struct Changes<T: Debug + ZeroCopySend + 'static> {
     pub(super) out: Out<T, ChangesHeader>,
-    /// Ports of the readers at this look, and at the one before.
+    /// Ports of the readers at this check, and at the last one.
     now: Vec<u128>,
     before: Vec<u128>,
-    /// Somebody came, or a message was lost, since the whole list was last sent.
+    /// A reader came, or a message was lost, since the whole list was last sent.
     owed: bool,
 }
 
@@ -38,8 +38,8 @@ impl<T: Debug + ZeroCopySend + Copy + 'static> Changes<T> {
         })
     }
 
-    /// Whether somebody reads it, and whether the whole list is owed. By ports, not by their number: one may have come
-    /// in the place of another.
+    /// Returns whether it has readers, and whether the whole list is owed. Compares ports, not their number: one may
+    /// have replaced another.
     pub(super) fn look(&mut self) -> (bool, bool) {
         std::mem::swap(&mut self.now, &mut self.before);
         self.now.clear();
@@ -51,13 +51,13 @@ impl<T: Debug + ZeroCopySend + Copy + 'static> Changes<T> {
             });
         }
         let is_read = !self.now.is_empty();
-        // Nothing is owed to those who have gone.
+        // Nothing is owed to readers that have gone.
         self.owed &= is_read;
         self.owed |= self.now.iter().any(|port| !self.before.contains(port));
         (is_read, self.owed)
     }
 
-    /// Sends it.
+    /// Sends the message.
     pub(super) fn send(&mut self, header: &ChangesHeader, rows: &[T]) -> Handed {
         let handed = super::sent::send(&self.out.publisher, header, rows);
         if handed != Handed::Over || header.base_tick == 0 {

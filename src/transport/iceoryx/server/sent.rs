@@ -1,4 +1,4 @@
-//! What goes out: hello, the messages of a tick in their order, connections of late joiners.
+//! Outgoing messages: hello, the messages of a tick in order, connections of late joiners.
 
 use iceoryx2::port::SendError;
 use iceoryx2::port::publisher::Publisher;
@@ -19,7 +19,7 @@ impl Server {
             .map_err(|e| failed("hello", e))
     }
 
-    /// Order is a promise: whoever has the tick has all that belongs to it.
+    /// The order is guaranteed: a reader that has the tick has all its messages.
     pub(super) fn send_all(&mut self, outbox: &Outbox) -> Result<Undelivered> {
         let mut unsent = self.send_rows(outbox);
         let header = &outbox.tick.header;
@@ -27,12 +27,12 @@ impl Server {
             truncated: 0,
             ..*header
         };
-        // never truncated, whatever was left out elsewhere
+        // Never truncated, whatever was left out elsewhere.
         if self.demand.body_verdicts {
             let handed = send(&self.body_verdicts.publisher, &whole, &outbox.body_verdicts);
             unsent.messages += handed.lost();
         }
-        // Told once: what could not be handed over is owed.
+        // Sent once: if it could not be delivered it is owed.
         self.names_owed |= outbox.names_changed;
         if self.names_owed {
             let handed = send(&self.names.publisher, &whole, &outbox.names);
@@ -51,7 +51,7 @@ impl Server {
         Ok(unsent)
     }
 
-    /// What has rows of pairs or bodies, in its order.
+    /// Sends the messages with rows of pairs or bodies, in order.
     fn send_rows(&mut self, outbox: &Outbox) -> Undelivered {
         let (demand, mut unsent) = (self.demand, Undelivered::default());
         if demand.contacts {
@@ -84,7 +84,7 @@ impl Server {
         unsent
     }
 
-    /// The pairs, with what is owed to their readers.
+    /// Sends the pairs, with what is owed to their readers.
     fn send_pairs(&self, outbox: &Outbox) -> Handed {
         let (publisher, header) = (&self.pairs.publisher, &outbox.pairs_header);
         if outbox.owed.is_empty() {
@@ -106,14 +106,14 @@ impl Server {
             ..*tick
         };
         self.tick.send_copy(tick).map_err(|e| failed("tick", e))?;
-        // a reader that cannot be notified still finds the tick when it looks
+        // A reader that cannot be notified still finds the tick when it checks.
         let _unheard = self.ready.notify();
         Ok(())
     }
 
-    /// Late joiners get the newest of what is not sent now.
+    /// Gives late joiners the newest of messages that are not sent now.
     pub(super) fn update_connections(&mut self) {
-        // one broken reader is no reason to stop; the next round tries again
+        // One broken reader is no reason to stop; the next round tries again.
         let _later = self.hello.update_connections();
         let _later = self.names.publisher.update_connections();
         let _later = self.plan.publisher.update_connections();
@@ -121,7 +121,7 @@ impl Server {
     }
 }
 
-/// How far a message came.
+/// How far a message was delivered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Handed {
     /// To all of its readers.
@@ -136,7 +136,7 @@ impl Handed {
     fn of(sent: &std::result::Result<usize, SendError>) -> Self {
         match sent {
             Ok(_) => Self::Over,
-            // these come before the first connection is written to
+            // These errors come before the first connection is written to.
             Err(
                 SendError::LoanError(_)
                 | SendError::ConnectionError(_)
@@ -146,13 +146,13 @@ impl Handed {
         }
     }
 
-    /// Messages that could not be handed over.
+    /// Number of messages that could not be delivered.
     pub(super) fn lost(self) -> u64 {
         u64::from(self != Self::Over)
     }
 }
 
-/// One message.
+/// Sends one message.
 pub(super) fn send<T, H>(publisher: &Publisher<Ipc, [T], H>, header: &H, rows: &[T]) -> Handed
 where
     T: std::fmt::Debug + ZeroCopySend + Copy + 'static,
@@ -201,7 +201,7 @@ mod tests {
             plan_changed: true,
             ..Outbox::default()
         };
-        // As with no memory left: none is lent while others are out.
+        // As with no memory left: no sample can be loaned while others are out.
         let mut names = Vec::new();
         while let Ok(sample) = server.names.publisher.loan_slice_uninit(1) {
             names.push(sample);
@@ -224,7 +224,7 @@ mod tests {
         assert!(!link.names(&mut heard).unwrap() && !link.plan(&mut plan).unwrap());
     }
 
-    /// Two balls, the second of which goes along x.
+    /// Two balls; the second moves along x.
     struct Balls {
         engine: Engine,
         clock: Arc<ManualClock>,
@@ -251,7 +251,7 @@ mod tests {
             }
         }
 
-        /// A tick, and what its door says of it.
+        /// Runs a tick; returns what could not be delivered.
         fn tick(&mut self, server: &mut Server, x: f64) -> Undelivered {
             self.clock.advance(10_000_000);
             self.seq += 1;
@@ -289,13 +289,13 @@ mod tests {
         }
     }
 
-    /// What a row says of events.
+    /// The events in a row.
     fn told(row: &PairRow) -> (u8, [u64; 2], [u64; 2]) {
         let begin = [row.begin_first_tick, row.begin_last_tick];
         (row.events, begin, [row.end_first_tick, row.end_last_tick])
     }
 
-    /// Holds all that a publisher lends, as with no memory left.
+    /// Holds all samples that a publisher loans, as with no memory left.
     macro_rules! hold {
         ($publisher:expr) => {{
             let mut held = Vec::new();
@@ -341,7 +341,7 @@ mod tests {
             pairs: true,
             changes: true,
         };
-        // The begin is lost to both, and once more to one of them.
+        // The begin is lost in both messages, and once more in one of them.
         let held_pairs = hold!(server.pairs.publisher);
         let held_changes = hold!(server.changes.out.publisher);
         assert_eq!(balls.tick(&mut server, 1.5), both);
@@ -359,7 +359,7 @@ mod tests {
         drop(held_changes);
         assert_eq!(balls.tick(&mut server, 1.5), Undelivered::default());
         assert_eq!(hear(&mut link), (Some(vec![persist]), Some(vec![begin])));
-        // The end is lost to both, and then the pair is gone.
+        // The end is lost in both messages, and then the pair is gone.
         let held_pairs = hold!(server.pairs.publisher);
         let held_changes = hold!(server.changes.out.publisher);
         assert_eq!(balls.tick(&mut server, 30.0), both);
@@ -368,7 +368,7 @@ mod tests {
         assert_eq!(hear(&mut link), (Some(vec![end]), Some(vec![end])));
         assert!(balls.engine.outbox().pairs.is_empty());
         assert_eq!(balls.tick(&mut server, 30.0), Undelivered::default());
-        // The whole list, for it has no rows: no more than it would take to say that one has left.
+        // The whole list, as it has no rows: no larger than a row for the pair that has left.
         assert_eq!(hear(&mut link), (Some(vec![]), Some(vec![])));
         balls.engine.validate().unwrap();
     }

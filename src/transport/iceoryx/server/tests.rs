@@ -1,4 +1,4 @@
-//! Goal: who cannot open an instance is told why. Method: the texts of what stands in the way.
+//! Goal: the error says why an instance cannot be opened. Method: the texts for each obstacle.
 
 use super::*;
 

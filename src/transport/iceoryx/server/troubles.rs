@@ -1,14 +1,13 @@
-//! Clients that are not heard, or do not hear: told when it begins, then seldom, with the cause where it is this
-//! process's own.
+//! Clients that cannot send or receive: logged when it begins, then rarely, with the cause if it lies in this process.
 
 use crate::time::Seldom;
 use crate::transport::iceoryx::unmet::Unmet;
 use crate::transport::open_files::short;
 
-/// Between two looks at how many files are open, nanoseconds: a look is a list of them, some 50 us.
+/// Time between two checks of how many files are open, nanoseconds: a check lists them, some 50 us.
 const LOOK_NS: u64 = 100_000_000;
 
-/// What went wrong with clients since the last look, and what was told of it.
+/// What went wrong with clients since the last check, and what was logged about it.
 #[derive(Debug, Default)]
 pub(super) struct Troubles {
     /// Connections that could not be made.
@@ -18,17 +17,17 @@ pub(super) struct Troubles {
     looked_ns: Option<u64>,
     errors: Seldom,
     crowded: Seldom,
-    /// What was said of the files at the last look that found too few.
+    /// Text about the files from the last check that found too few.
     short: String,
 }
 
 impl Troubles {
-    /// Messages could not be received: what is in them is lost.
+    /// Counts messages that could not be received: their content is lost.
     pub(super) fn failed(&mut self, times: u64) {
         self.failed += times;
     }
 
-    /// Says what is to be told of now.
+    /// Logs what is due now.
     ///
     /// * `now_ns` - nanoseconds, always of the same clock.
     pub(super) fn tell(&mut self, now_ns: u64) {
@@ -47,9 +46,9 @@ impl Troubles {
         }
     }
 
-    /// Finds the cause of what went wrong since the last look.
+    /// Finds the cause of what went wrong since the last check.
     ///
-    /// * `short` - what to say where too few files are left.
+    /// * `short` - text if too few files are left.
     fn look(&mut self, now_ns: u64, short: impl Fn() -> Option<String>) {
         let (failed, unmet) = (std::mem::take(&mut self.failed), self.unmet.take());
         if failed + unmet == 0 {
@@ -60,7 +59,7 @@ impl Troubles {
             self.short = short;
             self.crowded.add(failed + unmet);
         } else {
-            // One that dies while it comes cannot be met, and nobody is there to miss it.
+            // A client that dies while connecting cannot be reached, and needs nothing any more.
             self.errors.add(failed);
         }
     }
@@ -98,7 +97,7 @@ mod tests {
             words.contains("110 of the 110") && words.contains("in part"),
             "{words}"
         );
-        // While there are enough, what fails is the client's.
+        // While there are enough files, failures are the client's.
         troubles.failed(3);
         troubles.look(6, none);
         assert_eq!(troubles.errors.note(0, 6), Some(3));

@@ -13,16 +13,16 @@ use crate::time::Clock;
 use crate::transport::Wake;
 use crate::transport::iceoryx::qos::{events, failed};
 
-/// Looks between two readings of the clock: as long as one reading takes.
+/// Checks between two readings of the clock: they take as long as one reading.
 const LOOKS_PER_READING: u32 = 8;
-/// A thread that finds something in every spin, or never sleeps, still looks at the wake-up port so often, nanoseconds:
-/// it tells who came and left, and costs a system call.
+/// A thread that finds something in every spin, or never sleeps, still checks the wake-up port this often, nanoseconds:
+/// it reports peers that came and left, and costs a system call.
 const LISTEN_EVERY_NS: u64 = 1_000_000;
-/// Shortest wait on a set of ports; they are for whole milliseconds.
+/// Shortest wait on a set of ports, which uses whole milliseconds.
 const SET_WAIT_MIN: Duration = Duration::from_millis(1);
-/// From so much on a millisecond more makes no difference, and an idle daemon wakes once.
+/// For longer waits an extra millisecond makes no difference, and an idle daemon wakes once.
 const LONG: Duration = Duration::from_millis(20);
-/// What is left of a shorter wait is slept in such slices: who comes meanwhile is heard at the end of one.
+/// The rest of a shorter wait is slept in slices of this length: events are noticed at the end of one.
 const SLICE: Duration = Duration::from_micros(100);
 
 impl Server {
@@ -36,10 +36,10 @@ impl Server {
 
     /// Spins as long as the options say, then sleeps for the rest of the time.
     ///
-    /// The notices of what a spin has found stay in the port: while they do, neither side pays a system call for more,
-    /// and the next sleep ends at once for nothing.
+    /// The notifications of what a spin has found stay in the port: meanwhile neither side pays a system call for more,
+    /// and the next sleep ends at once without need.
     pub(super) fn spin_then_sleep(&mut self, timeout_ns: u64, clock: &dyn Clock) -> Result<Wake> {
-        // A large request is copied part by part, with looks at what else has come between them.
+        // A large request is copied in parts, with checks for other messages between them.
         if self.arrivals.is_more() {
             let mut wake = self.listen()?;
             wake.notified = true;
@@ -47,7 +47,7 @@ impl Server {
         }
         let mut now_ns = clock.monotonic_ns();
         let until_ns = now_ns.saturating_add(timeout_ns);
-        // A glance is no wait: it says nothing of how soon the other side answers.
+        // A check without waiting does not show how soon the other side answers.
         let look_ns = if timeout_ns == 0 {
             0
         } else {
@@ -73,11 +73,12 @@ impl Server {
         self.sleep_until(until_ns, clock)
     }
 
-    /// Sleeps until something comes or the time is up: a long time to a millisecond, a short one to a tenth of that.
+    /// Sleeps until something comes or the time is up: precise to a millisecond for a long time, to a tenth of that for
+    /// a short one.
     ///
-    /// Not by the wake-up port's own time-out: the system counts that in ticks of its timer, 4 ms with the usual
-    /// 250 Hz, and rounds it up, so that 100 beats a second were 70. A wait on a set of ports is for whole
-    /// milliseconds; the rest is slept in slices.
+    /// Not by the wake-up port's own time-out: the system counts that in ticks of its timer, 4 ms with the usual 250
+    /// Hz, and rounds it up, so that 100 beats a second became 70. A wait on a set of ports uses whole milliseconds;
+    /// the rest is slept in slices.
     fn sleep_until(&mut self, until_ns: u64, clock: &dyn Clock) -> Result<Wake> {
         loop {
             self.listened_ns = clock.monotonic_ns();
@@ -123,7 +124,7 @@ impl Server {
         self.listen()
     }
 
-    /// Takes what stands in the wake-up port.
+    /// Takes the events from the wake-up port.
     pub(super) fn listen(&mut self) -> Result<Wake> {
         let mut wake = Wake::default();
         let note = |activation: EventActivation| match activation.id.as_value() {
@@ -142,7 +143,7 @@ impl Server {
     }
 }
 
-/// The whole milliseconds of a time.
+/// A time rounded to whole milliseconds.
 fn whole(time: Duration) -> Duration {
     Duration::from_millis(u64::try_from(time.as_millis()).unwrap_or(u64::MAX))
 }
