@@ -9,7 +9,7 @@
 //! is proved by a chain of points of the difference, each the sum of a point of the other core and a corner of the
 //! outline, from the top down:
 //! * A point's place along the plane is a constant plus a sine of the angle, so within the sector it is below the
-//!   straight line between its ends by no more than its bend allows: by nothing if it is on the plane's side of the axis.
+//!   straight line between its ends by at most what its bend allows: by nothing on the plane's side of the axis.
 //! * With places along the plane linear and heights constant, a direction along which two successive points reach `d`
 //!   at both ends of the sector does so in between. So does the normal of the line through them if it is `d` away at
 //!   both ends: `p x q - d |q - p|` is linear less convex.

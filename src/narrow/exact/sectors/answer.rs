@@ -84,7 +84,7 @@ impl Around<'_> {
             for other in &shown[k..] {
                 let (from, way) = (one - across, other - one);
                 let height = from.z.clamp(-half_m, half_m) - from.z;
-                // The first point, the middle, where they cross the plane, and where they reach the round core's height.
+                // The first, the middle, where they cross the plane, and where they are as high as the round core.
                 for part in [0.0, 0.5, -from.dot(&side) / way.dot(&side), height / way.z] {
                     let point = one + way * part.clamp(0.0, 1.0);
                     let near = nearest(round.core(), &(point - across));
