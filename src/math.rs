@@ -69,7 +69,7 @@ pub fn f32_up(x: f64) -> f32 {
 
 /// The pose of 2 seen from 1, from two world poses.
 ///
-/// The translations are subtracted first: far from the origin a product of world matrices loses the digits of the offset.
+/// The translations are subtracted first: far from the origin a product of world matrices loses digits.
 #[must_use]
 pub fn relative(pose1: &Pose, pose2: &Pose) -> Pose {
     let inverse = pose1.rotation.inverse();

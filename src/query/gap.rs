@@ -14,7 +14,7 @@ pub struct GapQuestion {
     b: Body,
     report_m: f64,
     tick_header: MessageHeader,
-    /// Oddities that are allowed.
+    /// Warnings: what is odd, but allowed.
     pub warnings: Vec<String>,
 }
 

@@ -1,5 +1,5 @@
 //! When two bodies first touch if they move on as they do, or as a question says. In: the question, and the world
-//! between two ticks. Out: a self-contained question; then a proved interval of the time, or a proof that there is none.
+//! between two ticks. Out: a self-contained question; then a proved interval of the time, or a proof of none.
 //!
 //! The motion is that of continuous bodies: the centre of a body's geometry, or of the body on which it hangs, moves
 //! straight, and the body rotates about one axis at a constant rate. So is the method: conservative advancement.
@@ -24,7 +24,7 @@ pub struct ImpactQuestion {
     within_s: f64,
     /// The part of the answer that needs no work.
     found: ImpactFound,
-    /// Oddities that are allowed.
+    /// Warnings: what is odd, but allowed.
     pub warnings: Vec<String>,
 }
 

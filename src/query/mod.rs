@@ -61,7 +61,7 @@ impl Query {
         }
     }
 
-    /// Oddities that are allowed.
+    /// Warnings: what is odd, but allowed.
     pub fn warnings(&mut self) -> &mut Vec<String> {
         match self {
             Self::Gap(question) => &mut question.warnings,

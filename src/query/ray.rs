@@ -2,7 +2,7 @@
 //! body that is hit, with a proved interval of the distance, or a proof that none is.
 //!
 //! How: the ray is cut where it passes the boxes of bodies, nearest first. A piece of it is a body without thickness:
-//! proved apart by the query of two bodies, it is free; certified to collide, it is hit. So halving the first piece that
+//! proved apart by the query of two bodies it is free, certified to collide it is hit. So halving the first piece that
 //! is not free closes in on the hit from both sides, for every kind of shape, surfaces too. From a free piece the ray
 //! is free for another stretch as long as the gap. Refused: a formula per shape, each with its proof of rounding.
 
@@ -43,7 +43,7 @@ pub struct RayQuestion {
     left_out_from_m: f64,
     /// The part of the answer that needs no work.
     found: RayFound,
-    /// Oddities that are allowed.
+    /// Warnings: what is odd, but allowed.
     pub warnings: Vec<String>,
 }
 

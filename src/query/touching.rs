@@ -39,7 +39,7 @@ pub struct TouchingQuestion {
     near: Vec<Near>,
     /// The part of the answer that needs no work.
     found: TouchingFound,
-    /// Oddities that are allowed.
+    /// Warnings: what is odd, but allowed.
     pub warnings: Vec<String>,
 }
 

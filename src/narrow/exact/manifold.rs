@@ -99,7 +99,7 @@ pub fn manifold(
     Found::of(&pair, closest, prediction_m).write(out);
 }
 
-/// Passes on all contact points of two shapes that touch, up to 16: the caller, who knows which were kept before,
+/// Passes on all contact points of two shapes that touch, up to 16: the caller knows which were kept before, and
 /// chooses four. Otherwise as [`manifold`]; points up to [`PREDICTION`] apart count.
 pub(in crate::narrow) fn touching_points(
     a: &Convex,

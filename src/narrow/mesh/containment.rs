@@ -1,7 +1,7 @@
 //! Whether one shape of a pair lies within the other while their surfaces are apart (law 3.3).
 //!
 //! One point of every connected surface is tested against the other solid, both ways. That is enough: if a point were
-//! in both shapes, a path out of one of them would meet its surface inside the other, and a connected surface that
+//! in both shapes, a path out of it would first meet the surface of one inside the other, and a connected surface that
 //! crosses nothing is inside entirely or not at all.
 
 use super::placed::Placed;

@@ -87,7 +87,7 @@ enum Base {
 ///
 /// * `go_on` - called between and within walks; if false, the work stops, to be started again with the trails of the
 ///   walks so far.
-/// * `returns` - whether it was finished.
+/// * returns - whether it was finished.
 pub(super) fn points(
     a: (Side<'_>, u32),
     b: (Side<'_>, u32),

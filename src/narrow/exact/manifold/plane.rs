@@ -1,7 +1,7 @@
 //! The feature of a convex shape that touches a half-space.
 //!
 //! In: a shape and the exact answer of the pair. Out: the corners of its feature along the plane's normal that lie on
-//! the plane or behind it, all of them: the caller, who knows which were kept before, chooses.
+//! the plane or behind it, all of them: the caller knows which were kept before, and chooses.
 
 use super::{Closest, Convex, Feature, Found, ManifoldPoint, PREDICTION, SAME, Surface};
 use crate::math::{Pose, Vec3};

@@ -65,7 +65,7 @@ impl Cap {
                     let along = [line[0] / length, line[1] / length];
                     let at = |slope: &[f64; 2]| slope[0] * along[0] + slope[1] * along[1];
                     let breadth = (-at(&one.slope)).min(at(&other.slope));
-                    // Directions that lean less than this cosine from across have no breadth.
+                    // Directions with a smaller cosine to the line lack breadth.
                     let narrow = reach / breadth;
                     let bent = curvature(set, weights, angle);
                     let across = across_least(&bent, along, narrow);
