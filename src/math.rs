@@ -1,4 +1,4 @@
-//! Numbers of the house: poses, boxes, intervals, outward rounding, and the one place that speaks glamx.
+//! Basic numeric types: poses, boxes, intervals, outward rounding, and the only place that uses glamx.
 //!
 //! f64 everywhere, metres and radians, right-handed, z up.
 
@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vect
 
 /// A vector or a direction, metres unless said otherwise.
 pub type Vec3 = Vector3<f64>;
-/// A point in the frame that its name or doc gives, metres.
+/// A point in the frame given by its name or doc, metres.
 pub type Point = Point3<f64>;
 /// A rotation.
 pub type Quat = UnitQuaternion<f64>;
@@ -16,7 +16,7 @@ pub type Pose = Isometry3<f64>;
 /// Unit roundoff of f64, 2^-53.
 pub const ROUND: f64 = f64::EPSILON / 2.0;
 
-/// The lesser of two numbers: one instruction, unlike `f64::min`, which asks for NaN.
+/// The lesser of two numbers: one instruction, unlike `f64::min`, which handles NaN.
 #[inline(always)]
 pub(crate) fn lesser<T: PartialOrd>(a: T, b: T) -> T {
     if a < b { a } else { b }
@@ -28,7 +28,7 @@ pub(crate) fn greater<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
 }
 
-/// Length of the part of a vector that is across z. Of what has at most some hundred kilometres nothing overflows, so
+/// Length of the component of a vector orthogonal to z. For lengths up to some hundred kilometres nothing overflows, so
 /// `hypot` would only be slow.
 #[inline]
 pub(crate) fn across_z(v: &Vec3) -> f64 {
@@ -50,7 +50,7 @@ pub fn f32_down(x: f64) -> f32 {
     }
 }
 
-/// The f32 nearest to `x`: one instruction, where [`f32_down`] takes a branch that is as good as random.
+/// The f32 nearest to `x`: one instruction, where [`f32_down`] takes a branch that is practically random.
 #[must_use]
 #[inline]
 #[allow(
@@ -69,7 +69,7 @@ pub fn f32_up(x: f64) -> f32 {
 
 /// The pose of 2 seen from 1, from two world poses.
 ///
-/// The translations are subtracted first: far from the origin a product of world matrices loses what they share.
+/// The translations are subtracted first: far from the origin a product of world matrices loses digits.
 #[must_use]
 pub fn relative(pose1: &Pose, pose2: &Pose) -> Pose {
     let inverse = pose1.rotation.inverse();
@@ -86,7 +86,7 @@ pub fn pose_from(position: [f64; 3], xyzw: [f64; 4]) -> Option<Pose> {
     if !finite || largest == 0.0 {
         return None;
     }
-    // Scaled by its largest part first where the squares need it, so that neither 1e-200 nor 1e200 loses the direction.
+    // Scaled by the largest component first if squares need it: neither 1e-200 nor 1e200 may lose the direction.
     let squares_fit = (1e-100..1e100).contains(&largest);
     let scaled = if squares_fit {
         quaternion
@@ -107,7 +107,7 @@ pub fn pose_from(position: [f64; 3], xyzw: [f64; 4]) -> Option<Pose> {
 pub fn displacement(from: &Pose, to: &Pose, centre: &Point, radius: f64) -> f64 {
     let moved = (to * centre) - (from * centre);
     let turn = chord(&from.rotation, &to.rotation);
-    // A few roundings of coordinates as large as the positions themselves stand behind each difference.
+    // Each difference has a few roundings of coordinates as large as the positions themselves.
     let magnitude = from
         .translation
         .vector
@@ -116,7 +116,7 @@ pub fn displacement(from: &Pose, to: &Pose, centre: &Point, radius: f64) -> f64 
         + centre.coords.amax()
         + radius;
     let way = moved.norm() + turn * radius;
-    // Poses are compared only where that may be: it takes as long as all the rest.
+    // Poses are compared only if they may be equal: that takes as long as all the rest.
     if way == 0.0 && from == to {
         0.0
     } else {
@@ -124,7 +124,7 @@ pub fn displacement(from: &Pose, to: &Pose, centre: &Point, radius: f64) -> f64 
     }
 }
 
-/// `2 sin(theta / 2)` of the rotation between two orientations: how far a point at radius 1 moves at most.
+/// `2 sin(theta / 2)` of the rotation between two orientations: the greatest motion of a point at radius 1.
 #[must_use]
 pub fn chord(from: &Quat, to: &Quat) -> f64 {
     let (a, b) = (from.as_vector(), to.as_vector());
@@ -165,8 +165,8 @@ impl Interval {
         }
     }
 
-    /// What both intervals allow. Two sound intervals of one number always meet; should rounding part them, `self`
-    /// wins.
+    /// The intersection of both intervals. Two sound intervals of one number always meet; if rounding separates them,
+    /// `self` wins.
     #[must_use]
     pub fn meet(self, other: Self) -> Self {
         let both = Self {
@@ -208,7 +208,7 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The box that holds nothing: the neutral element of [`Aabb::merged`].
+    /// The empty box: the neutral element of [`Aabb::merged`].
     #[must_use]
     pub fn empty() -> Self {
         let (low, high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -239,8 +239,8 @@ impl Aabb {
     #[must_use]
     #[inline]
     pub fn widened(&self, margin_m: f64) -> Self {
-        // An ulp or two; as a product, since stepping to the next float costs ten times as much. Where that is not less
-        // there is nothing to round: a sum so small is exact, and an end of the box that holds nothing is infinite.
+        // An ulp or two; as a product, since stepping to the next float costs ten times as much. If the product is not
+        // less, there is nothing to round: a sum so small is exact, and the ends of the empty box are infinite.
         let below = |v: f64| {
             let less = v - v.abs() * f64::EPSILON;
             if less < v { less } else { v }
@@ -257,13 +257,13 @@ impl Aabb {
         (0..3).all(|k| self.min[k] <= other.max[k] && other.min[k] <= self.max[k])
     }
 
-    /// Whether `other` lies wholly inside.
+    /// Whether `other` lies entirely inside.
     #[must_use]
     pub fn holds(&self, other: &Self) -> bool {
         (0..3).all(|k| self.min[k] <= other.min[k] && other.max[k] <= self.max[k])
     }
 
-    /// A lower bound on the distance between anything in the one and anything in the other; 0 when they overlap.
+    /// A lower bound on the distance between the contents of both; 0 if they overlap.
     #[must_use]
     pub fn distance(&self, other: &Self) -> f64 {
         let apart = |k: usize| {
@@ -294,7 +294,7 @@ pub(crate) fn to_glam_vec(v: &Vec3) -> glamx::DVec3 {
     glamx::DVec3::new(v.x, v.y, v.z)
 }
 
-/// The lower ten bits of a number, two zeros between any two: a share of a place on the Morton curve (Morton 1966).
+/// The lower ten bits of a number, with two zeros between any two: one coordinate of a Morton code (Morton 1966).
 #[must_use]
 pub(crate) fn morton_bits(cell: u32) -> u32 {
     let mut bits = cell & 0x3FF;
@@ -325,7 +325,7 @@ mod tests {
                 let (v, margin_m) = (v * scale, margin_m * scale);
                 let at = Point::new(v, v, v);
                 let wide = Aabb { min: at, max: at }.widened(margin_m);
-                // What a sum is off by, exactly (Knuth).
+                // The exact error of a sum (Knuth).
                 let low = v - margin_m;
                 let back = low - v;
                 let off = (v - (low - back)) + (-margin_m - back);

@@ -1,32 +1,32 @@
-//! Approximate contacts: where a pair may touch, when there was no time to find out or to find all of it.
+//! Approximate contacts: where a pair may touch, when time ran out before that was decided or all contacts were found.
 //!
 //! In: what a pair holds when work stops. Out: at most [`limits::REGIONS_PER_PAIR_MAX`] spheres, each with a cone of
-//! normals and a best guess of point, normal and depth, good enough to drive a response. What is claimed:
-//! - their union holds every point that the two share at this tick's poses. Of a mesh its surface counts, of a convex
-//!   shape or half-space its inside too; of a surface that lies within the other as a whole all of it;
-//! - of a pair whose contacts are complete the union also holds both points of each contact; of two convex shapes that
-//!   is then all it holds;
-//! - the cone holds the outward normals of every face of A and the inward ones of every face of B that may meet in the
-//!   sphere, with the arcs between neighbours; of a complete pair also its contacts' normals. What a manifold finds
-//!   later is mostly in it, not surely: it may be the normal of two edges, or of faces beside the sphere, for its
-//!   points lie deeper than what is shared. Measured (`benches/time_critical`, meshes of 19,880 triangles): 99.4 to
-//!   100 % of them, 98.6 % at the worst share of the work of pairs that overlap by a fifth;
-//! - of a pair with a body of unknown place: the boxes, no more. Of one that is not known to collide, but may have
-//!   touched on the way to these poses, too.
+//! normals and a best guess of point, normal and depth, good enough to drive a response. The claims:
+//! - the union of the spheres holds every point that the two share at this tick's poses. A mesh counts as its surface,
+//!   a convex shape or half-space as a solid; of a surface that lies entirely within the other body, all points count;
+//! - if the pair's contacts are complete, the union also holds both points of each contact; for two convex shapes it
+//!   then holds nothing else;
+//! - the cone holds the outward normals of every face of A and the inward normals of every face of B that may meet in
+//!   the sphere, with the arcs between neighbours; for a complete pair also its contacts' normals. Normals that a
+//!   manifold finds later are mostly, but not surely, in it: they may be the normal of two edges, or of faces outside
+//!   the sphere, for its points lie deeper than the shared ones. Measured: 95.4 to 100 % of them (`benches/README.md`,
+//!   Approximate contacts);
+//! - for a pair with a body of unknown place, the spheres cover only what the boxes share. The same for a pair that is
+//!   not known to collide but may have touched on the way to these poses.
 //!
-//! How: every pair of boxes of a front that is not proved apart at these poses, or the roots where there is no front,
-//! is cut down to what the two boxes share; the largest are split by a few tests of their own, down to triangles cut by
-//! triangles; then a few spheres are put round all (`gather`). Boxes are of the bodies, so that an old front serves at
-//! new poses: only its proofs are shorter by the motion since. So work narrows the regions, motion widens them, and a
-//! pair that was never worked on has them too.
+//! How: every pair of boxes of a front that is not proved apart at these poses (without a front: the roots) is cut down
+//! to what the two boxes share. The largest are split by a few tests of their own, down to triangles cut by triangles;
+//! then a few spheres enclose them all (`gather`). Boxes are in body frames, so an old front serves at new poses: its
+//! proofs are only shorter by the motion since. So work narrows the regions, motion widens them, and a pair that was
+//! never worked on has regions too.
 //!
-//! Splitting is the last work of the budget, counted like any other (`refine`). Publishing does no test: it copies what
-//! splitting has made at these poses, or looks at a few boxes of the front, or at the roots alone. Nothing of it runs
-//! while nobody listens.
+//! Splitting is the last item of the budget and counted like any other (`refine`). Publishing does no test: it copies
+//! what splitting made at these poses, or reads a few boxes of the front, or the roots alone. Without listeners none of
+//! this runs.
 //!
 //! Source: Dingliana and O'Sullivan 2000, Graceful degradation of collision handling in physically based animation
-//! (RTR3 section 17.6.1): when time runs out, respond from the level reached. There the level is of spheres, and their
-//! union is not sure to hold the contact.
+//! (RTR3 section 17.6.1): when time runs out, respond from the level reached. Their levels are spheres, whose union is
+//! not sure to hold the contact.
 
 mod collect;
 mod gather;
@@ -54,7 +54,7 @@ use pace::Pace;
 pub(super) use refine::Kept;
 pub(in crate::narrow) use spot::{Slab, Spot};
 
-/// Contacts found by now that guesses are made of; more of a pair are passed over.
+/// At most this many contacts of an unfinished pair are used for guesses; the rest is ignored.
 const FOUND_MAX: usize = 32;
 
 /// A place where two bodies may touch, A's body frame.
@@ -83,42 +83,42 @@ pub struct Regions<'a> {
     pub all: &'a [Region],
     /// The pair's contacts are exact at these poses, and all of them lie in these.
     pub complete: bool,
-    /// There was more than was looked at: one region stands for the rest.
+    /// There were more candidates than were looked at: one region stands for the rest.
     pub clipped: bool,
-    /// How far work came; `Boxes`: no more than the bodies' boxes is behind them.
+    /// How far work got; `Boxes`: the regions rest on the bodies' boxes alone.
     pub level: Level,
 }
 
-/// Memory kept from pair to pair.
+/// Memory reused from pair to pair.
 #[derive(Debug, Default)]
 pub(super) struct Approx {
-    /// Of the shape pair at hand, in the order of its front, then by size.
+    /// Spots of the current shape pair, in the order of its front, then by size.
     raw: Vec<Spot>,
     heap: BinaryHeap<Spot>,
     waiting: Waiting,
-    /// Places of the shape pairs that may touch.
+    /// Indices of the shape pairs that may touch.
     near: Vec<(u32, u32)>,
-    /// Of the body pair, A's body frame.
+    /// Spots of the body pair, A's body frame.
     all: Vec<Spot>,
-    /// Contacts found by now of a pair that is not finished: for the guesses, not for the spheres.
+    /// Contacts found so far of a pair that is not finished: for the guesses, not for the spheres.
     found: Vec<Spot>,
     balls: Vec<Ball>,
     regions: Vec<Region>,
     clipped: bool,
 }
 
-/// How a pair stands when its regions are asked for.
+/// State of a pair when its regions are requested.
 struct Standing<'a> {
     a: &'a Body,
     b: &'a Body,
     finding: Finding<'a>,
-    /// Both are where their poses say: what they share now is told.
+    /// Both bodies are where their poses say, so the regions cover what they share now.
     placed: bool,
     /// Its contacts are exact at these poses.
     complete: bool,
 }
 
-/// Where regions were made, and of what.
+/// The poses and deformation for which regions were made.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     rel: Pose,
@@ -137,7 +137,7 @@ impl Standing<'_> {
 }
 
 impl Approx {
-    /// With room for all that it will hold: a later peak allocates nothing.
+    /// Clears it and reserves its full capacity: a later peak allocates nothing.
     fn ready(&mut self) {
         self.raw.clear();
         self.raw.reserve(SPOTS_MAX);
@@ -157,13 +157,13 @@ impl Approx {
 }
 
 impl Narrow {
-    /// Where a pair may touch; `None` for one that is proved apart at this tick's poses and on the way to them. No test
-    /// is done for it.
+    /// Where a pair may touch; `None` for one that is proved apart at this tick's poses and on the way to them. Runs no
+    /// test.
     ///
-    /// * `looks` - pairs of boxes of one shape pair that may be looked at, where splitting has made nothing that holds;
-    ///   where there are more, only the roots are.
+    /// * `looks` - how many pairs of boxes of one shape pair may be read where splitting has left no valid result; if
+    ///   there are more, only the roots are read.
     ///
-    /// Cost: some 0.5 us a look and 5 us for the rest; next to nothing of a pair that was split at these poses, or is
+    /// Cost: some 0.5 us a look and 5 us for the rest; next to nothing for a pair that was split at these poses, or is
     /// complete and has not moved since. No allocation after the first.
     pub fn regions(&mut self, slot: PairSlot, world: &World, looks: usize) -> Option<Regions<'_>> {
         let mut approx = std::mem::take(&mut self.approx);
@@ -219,7 +219,7 @@ impl Narrow {
         let (contacts, tick) = self.contacts(slot);
         let current = finding.level == Level::Exact && tick >= finding.tested;
         let collides = finding.verdict == Verdict::Colliding;
-        // On the way it may have touched anywhere: of one that collides now, what it shares now is told.
+        // On the way it may have touched anywhere; if it collides now, report what it shares now.
         let placed = open && at_pose(a) && at_pose(b) && (collides || !swept);
         Some(Standing {
             a,
@@ -230,7 +230,7 @@ impl Narrow {
         })
     }
 
-    /// Makes the regions of a pair that is where its poses say; what was made before the pace was cut is not all.
+    /// Makes the regions of a pair that is where its poses say; incomplete if the pace was cut.
     fn find_regions(
         &self,
         slot: PairSlot,
@@ -244,7 +244,7 @@ impl Narrow {
         }
     }
 
-    /// Puts a few spheres round all spots, with a guess in each.
+    /// Encloses all spots in a few spheres, each with a guess.
     fn round_up(of: &Standing<'_>, approx: &mut Approx) {
         cut(&mut approx.all);
         gather(&mut approx.all, &mut approx.balls);
@@ -263,7 +263,7 @@ fn at_pose(body: &Body) -> bool {
     matches!(body.status, BodyStatus::Known | BodyStatus::Held) && body.reach_m == 0.0
 }
 
-/// What the boxes of two bodies share, reach and way included, A's body frame.
+/// What the boxes of two bodies share, including reach and way, A's body frame.
 fn boxes(a: &Body, b: &Body) -> Spot {
     let (low, high) = (a.proxy.min.sup(&b.proxy.min), a.proxy.max.inf(&b.proxy.max));
     let known = (a.reach_m + b.reach_m).is_finite() && (high - low).iter().all(|x| x.is_finite());
@@ -288,7 +288,7 @@ fn boxes(a: &Body, b: &Body) -> Spot {
     .of_any_normal()
 }
 
-/// What is guessed of a pair as a whole, A's body frame.
+/// Guesses for a pair as a whole, A's body frame.
 struct Guess {
     normal: Vec3,
     depth_m: f64,
@@ -304,7 +304,7 @@ impl Guess {
         let seen = finding.witness;
         let depth_m = match seen {
             Some(witness) if witness.best_m <= 0.0 => -witness.best_m,
-            // Between nothing and all that is possible.
+            // Halfway between zero and the deepest possible.
             _ => 0.5 * deepest_m,
         };
         Self {
@@ -351,17 +351,17 @@ impl Guess {
 }
 
 impl Spot {
-    /// The same with other normals.
+    /// The same spot with other normals.
     fn of_normals(self, cone: Cone) -> Self {
         Self { cone, ..self }
     }
 
-    /// The same, of which no normal is known.
+    /// The same spot, with no normal known.
     fn of_any_normal(self) -> Self {
         self.of_normals(Cone::every(Vec3::zeros()))
     }
 
-    /// An aligned box as an oriented one at a pose.
+    /// An aligned box taken to a pose: an oriented one.
     fn placed(obb: &Obb, pose: &Pose) -> Obb {
         Obb {
             centre: pose * obb.centre,

@@ -1,8 +1,8 @@
-//! Memory of many owners in one place, so that a tick at constant scene allocates nothing and what one gave back serves
-//! the others.
+//! Memory of many owners in one place, so that a tick at constant scene allocates nothing and released memory serves
+//! the other owners.
 //!
-//! It grows by chunks, each as large as all before it, and no item moves for it: one vector that doubles copied some
-//! megabytes now and then, a millisecond in which no deadline is looked at.
+//! It grows by chunks, each as large as all earlier ones together, and no item moves: a single vector that doubles
+//! copied some megabytes now and then, a millisecond in which no deadline is checked.
 
 use crate::ids::small;
 use crate::time::Meter;
@@ -13,36 +13,36 @@ const BLOCK_MIN: usize = 4;
 const CLASSES: usize = 24;
 /// Items of the first chunk.
 const CHUNK_MIN: usize = 256;
-/// Of a place in the arena so many bits are the item's place in its chunk, those above name the chunk.
+/// The low bits of a place in the arena, this many, are the item's place in its chunk; the bits above name the chunk.
 const PLACE_BITS: u32 = 26;
 const CHUNK_MAX: usize = 1 << PLACE_BITS;
 /// Bytes that the operating system gives at once.
 const PAGE: usize = 4096;
-/// Pages that are touched ahead of their use, at most: with fewer a tick's end meets untouched ones, with more memory
-/// is taken that may never be used.
+/// Most pages touched ahead of their use: fewer, and the end of a tick meets untouched ones; more, and memory is taken
+/// that may never be used.
 const PAGES_AHEAD: usize = 8;
-/// Pages that one call of [`Arena::touch_ahead`] touches, at most.
+/// Most pages that one call of [`Arena::touch_ahead`] touches.
 const PAGES_AT_ONCE: usize = 2;
-/// A page is touched only where so much time is left, nanoseconds: that takes up to 30 us on a virtual machine.
+/// A page is touched only if this much time is left, nanoseconds: it takes up to 30 us on a virtual machine.
 const PAGE_NS: u64 = 40_000;
 /// No block.
 const NONE: u32 = u32::MAX;
 
-/// An item of an arena; in a free block the first one says where the next free block is.
+/// An item of an arena; in a free block the first item links to the next free block.
 pub(super) trait Linked: Copy {
-    /// The same with a link in it.
+    /// The same item with a link in it.
     #[must_use]
     fn linked(self, next: u32) -> Self;
-    /// The link put in.
+    /// The stored link.
     fn next(&self) -> u32;
 }
 
-/// The items of one owner: a place in an [`Arena`]. To forget it leaks its block.
+/// The items of one owner: a place in an [`Arena`]. Dropping it without a release leaks its block.
 #[derive(Debug, Default)]
 pub(super) struct Run {
     at: u32,
     len: u32,
-    /// Items its block holds; 0: it has none.
+    /// Items that its block can hold; 0: it has none.
     room: u32,
 }
 
@@ -60,24 +60,24 @@ impl Run {
         self.len = 0;
     }
 
-    /// Its chunk, and where in it.
+    /// Its chunk, and the range in it.
     fn range(&self) -> (usize, std::ops::Range<usize>) {
         let (chunk, at) = split(self.at);
         (chunk, at..at + self.len as usize)
     }
 }
 
-/// Blocks of 4, 8, 16, ... items in chunks of which only ever more are added, up to a limit.
+/// Blocks of 4, 8, 16, ... items in chunks; chunks are only ever added, up to a limit.
 ///
-/// A block that is given back serves the next owner, whole or split; blocks are not merged, so the memory is at most
-/// the sum of what was ever in use at once of each size.
+/// A released block serves the next owner, whole or split; blocks are not merged, so the memory is at most the sum of
+/// the peaks of each size.
 #[derive(Debug)]
 pub(super) struct Arena<T> {
-    /// Each with all the room that it will ever have.
+    /// Each allocated with its final capacity.
     chunks: Vec<Vec<T>>,
     /// Items of all blocks.
     len: usize,
-    /// Up to which item of the last chunk memory was touched ahead.
+    /// End of the memory of the last chunk that was touched ahead, in items.
     touched: usize,
     /// The first free block of each size.
     free: [u32; CLASSES],
@@ -85,7 +85,7 @@ pub(super) struct Arena<T> {
 }
 
 impl<T> Default for Arena<T> {
-    /// Without a limit of its own.
+    /// Without a limit.
     fn default() -> Self {
         Self {
             chunks: Vec::new(),
@@ -98,7 +98,7 @@ impl<T> Default for Arena<T> {
 }
 
 impl<T: Linked> Arena<T> {
-    /// At most so many items of all owners together, free blocks included.
+    /// At most this many items of all owners together, free blocks included.
     pub(super) fn new(most: usize) -> Self {
         Self {
             most: most.min(NONE as usize),
@@ -121,7 +121,7 @@ impl<T: Linked> Arena<T> {
         (self.chunks.get_mut(chunk)).map_or(&mut [], |items| &mut items[range])
     }
 
-    /// Appends an item; false, and nothing is changed, where there is no room.
+    /// Appends an item; returns false, and changes nothing, if there is no room.
     pub(super) fn push(&mut self, run: &mut Run, item: T) -> bool {
         if run.len == run.room && !self.grow(run, item) {
             return false;
@@ -136,14 +136,14 @@ impl<T: Linked> Arena<T> {
         Some(*self.item_mut(run.at + run.len))
     }
 
-    /// Takes an item out; the last one takes its place.
+    /// Removes an item; the last one takes its place.
     pub(super) fn swap_remove(&mut self, run: &mut Run, at: usize) -> Option<T> {
         let last = self.pop(run)?;
         let hole = self.all_mut(run).get_mut(at);
         Some(hole.map_or(last, |hole| std::mem::replace(hole, last)))
     }
 
-    /// Gives the block back.
+    /// Releases the block.
     pub(super) fn release(&mut self, run: &mut Run) {
         if run.room > 0 {
             self.give(run.at, class_of(run.room as usize));
@@ -188,7 +188,7 @@ impl<T: Linked> Arena<T> {
         Some(at)
     }
 
-    /// A block that none was before: behind the others of a chunk, or in a new one.
+    /// A block from unused memory: behind the others of a chunk, or in a new chunk.
     fn add_block(&mut self, class: usize, filler: T) -> Option<u32> {
         let room = BLOCK_MIN << class;
         if class >= CLASSES || self.len + room > self.most {
@@ -212,9 +212,9 @@ impl<T: Linked> Arena<T> {
         Some(small(chunk) << PLACE_BITS | small(at))
     }
 
-    /// Touches memory that the next blocks will be in, a little at a time and where there is time for it, so that the
-    /// operating system gives it now: that takes 1 us a page, on a virtual machine up to 30, and is not to come at the
-    /// end of a tick.
+    /// Touches the memory of the next blocks, a little at a time and only if there is time, so that the operating
+    /// system provides it now: that takes 1 us a page, on a virtual machine up to 30, and must not happen at the end of
+    /// a tick.
     pub(super) fn touch_ahead(&mut self, meter: &mut Meter<'_>) {
         let Some(items) = self.chunks.last_mut() else {
             return;
@@ -255,7 +255,7 @@ impl<T: Linked + Ord> Arena<T> {
         self.all(run).first()
     }
 
-    /// Adds an item to a run that is a heap; false where there is no room.
+    /// Adds an item to a run that is a heap; false if there is no room.
     pub(super) fn push_heap(&mut self, run: &mut Run, item: T) -> bool {
         if !self.push(run, item) {
             return false;
@@ -270,7 +270,7 @@ impl<T: Linked + Ord> Arena<T> {
         true
     }
 
-    /// Takes the greatest item off a run that is a heap.
+    /// Removes the greatest item of a run that is a heap.
     pub(super) fn pop_heap(&mut self, run: &mut Run) -> Option<T> {
         let last = self.pop(run)?;
         let items = self.all_mut(run);
@@ -283,7 +283,7 @@ impl<T: Linked + Ord> Arena<T> {
             if child >= items.len() {
                 break;
             }
-            // Without a branch: which of the two is greater is as good as random.
+            // Branch-free: which of the two is greater is practically random.
             child += usize::from(child + 1 < items.len() && items[child] < items[child + 1]);
             if items[child] <= last {
                 break;
@@ -296,12 +296,12 @@ impl<T: Linked + Ord> Arena<T> {
     }
 }
 
-/// The chunk that a place names, and the place in it.
+/// The chunk that a place names, and the index in it.
 fn split(at: u32) -> (usize, usize) {
     ((at >> PLACE_BITS) as usize, at as usize % CHUNK_MAX)
 }
 
-/// Which size of block holds so many items; a power of two of [`BLOCK_MIN`].
+/// The class of a block of `room` items; `room` is [`BLOCK_MIN`] times a power of two.
 fn class_of(room: usize) -> usize {
     (room / BLOCK_MIN).trailing_zeros() as usize
 }

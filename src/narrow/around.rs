@@ -1,13 +1,13 @@
-//! Bounds on the gap of two bodies from what lies around them, boxes and balls: what holds before any work is done.
+//! Bounds on the gap of two bodies from their bounding boxes and balls: what holds before any work is done.
 
 use crate::math::Interval;
 use crate::world::Body;
 
 /// Bounds on the gap of two bodies from their boxes (or a half-space's plane) alone.
 ///
-/// Lower: along each axis, what separates the boxes, or how deep they overlap. It holds for every kind of gap:
-/// a translation by the overlap separates convex pieces, and a point of the one under the surface of the other leaves
-/// the other's box within the overlap. Upper: any two points of the two are no farther apart than this.
+/// Lower: along each axis, what separates the boxes, or how deep they overlap. It holds for every kind of gap: a
+/// translation by the overlap separates convex pieces, and a point of A under B's surface leaves B's box within the
+/// overlap. Upper: no two points of the bodies are farther apart than this.
 pub(super) fn box_bounds(a: &Body, b: &Body) -> Interval {
     if a.unbounded || b.unbounded {
         return Interval::UNKNOWN;
@@ -24,8 +24,8 @@ pub(super) fn box_bounds(a: &Body, b: &Body) -> Interval {
 
 /// Bounds on the gap from the balls around the two bodies: what holds before any work is done.
 ///
-/// The lower end holds for overlapping bodies, too: a translation by the balls' overlap separates convex pieces, and no
-/// point of the one lies deeper under the surface of the other.
+/// The lower end holds for overlapping bodies too: a translation by the balls' overlap separates convex pieces, and no
+/// point of one lies deeper under the surface of the other.
 pub(super) fn whole_bounds(a: &Body, b: &Body) -> Interval {
     if a.unbounded || b.unbounded {
         return Interval::UNKNOWN;
@@ -37,7 +37,7 @@ pub(super) fn whole_bounds(a: &Body, b: &Body) -> Interval {
     }
 }
 
-/// Distance of the centres of two bodies, and by how much that and a sum with their radii may be off, metres.
+/// Distance of the centres of two bodies, and the error bound of it and of its sums with their radii, metres.
 ///
 /// A centre is the sum of two numbers that may both be far larger than it.
 fn between_centres(a: &Body, b: &Body) -> (f64, f64) {

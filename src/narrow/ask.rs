@@ -1,7 +1,7 @@
-//! The gap of two bodies on demand, whatever filters, boxes and certificates say: a query beside the pair set.
+//! The gap of two bodies on demand, regardless of filters, boxes and certificates: a query outside the pair set.
 //!
-//! In: two bodies as they stand, a [`Meter`]. Out: a sound interval of their gap from the first unit on, a verdict, a
-//! witness. Nothing is remembered, so the answer is the same whoever asked before.
+//! In: two bodies at their present poses, a [`Meter`]. Out: a sound interval of their gap from the first unit on, a
+//! verdict, a witness. Nothing is stored, so the answer does not depend on earlier queries.
 
 use crate::math::{Interval, relative};
 use crate::time::Meter;
@@ -19,14 +19,14 @@ use super::memo::Witness;
 use super::mesh::{Goal, Search};
 use super::shelves::Shelves;
 
-/// What is known of two bodies after a query of their own.
+/// What is known of two bodies after a query on demand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Asked {
     /// Sound interval of the gap, metres.
     pub gap: Interval,
-    /// As law 3.4 says; `Possible` only where the meter closed, or zero could not be told from the gap.
+    /// By law 3.4; `Possible` only if the meter closed, or the gap could not be distinguished from zero.
     pub verdict: Verdict,
-    /// Finished, and 0 cannot be told from the gap.
+    /// Finished, and the gap cannot be distinguished from 0.
     pub touching: bool,
     /// Nothing was cut off.
     pub finished: bool,
@@ -34,10 +34,10 @@ pub struct Asked {
     pub witness: Option<Witness>,
 }
 
-/// The gap of two bodies at the poses they have.
+/// The gap of two bodies at their present poses.
 ///
-/// * `report_m` - nearer than this is `near`, metres.
-/// * `meter` - where it closes, what is known by then is the answer.
+/// * `report_m` - pairs nearer than this are `near`, metres.
+/// * `meter` - if it closes, the answer is what is known by then.
 ///
 /// Two bodies that have half-spaces have no gap (law 3.2): their interval stays unknown.
 #[must_use]
@@ -63,7 +63,7 @@ pub fn gap_between(a: &Body, b: &Body, report_m: f64, meter: &mut Meter<'_>) -> 
             max,
         }
     };
-    // An overlap that is proved is no touch, however near 0 its upper end: that of meshes is a bound, not a depth.
+    // A proved overlap is not touching, however near 0 its upper end: that of meshes is a bound, not a depth.
     let touching = finished && certain && gap.contains(0.0) && gap.max > 0.0;
     Asked {
         gap,
@@ -82,7 +82,7 @@ pub fn gap_between(a: &Body, b: &Body, report_m: f64, meter: &mut Meter<'_>) -> 
     }
 }
 
-/// Of two bodies of one shape each.
+/// The gap of two bodies of one shape each.
 fn of_shapes(
     (a, b): (&Body, &Body),
     shapes: (&PlacedShape, &PlacedShape),
@@ -100,7 +100,7 @@ fn of_shapes(
         contacts,
         search: Search::default(),
     };
-    // Nobody else waits for a turn.
+    // No other pair waits for a turn.
     let asked = (report_m, u64::MAX);
     let turn = cursor.turn(&mut room, shapes, asked, meter, &mut bench.counters);
     Told {
@@ -111,7 +111,7 @@ fn of_shapes(
     }
 }
 
-/// Of two bodies of which at least one has several shapes.
+/// The gap of two bodies of which at least one has several shapes.
 fn of_parts((a, b): (&Body, &Body), report_m: f64, meter: &mut Meter<'_>) -> Told {
     let (mut bench, mut front) = (Bench::default(), CompoundFront::default());
     let mut tools = bench.tools();
@@ -126,7 +126,7 @@ fn of_parts((a, b): (&Body, &Body), report_m: f64, meter: &mut Meter<'_>) -> Tol
     }
 }
 
-/// What a query of its own keeps what it finds on.
+/// Memory for one query on demand.
 #[derive(Default)]
 pub(super) struct Bench {
     pub(super) shelves: Shelves,

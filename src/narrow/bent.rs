@@ -1,14 +1,14 @@
-//! What two bodies or shapes have deformed: the running sums of both, each by itself.
+//! The deformation of two bodies or shapes: a running sum for each of them.
 //!
-//! In: the sums at one moment and at another. Out: by how much the two may be nearer since. Refused: one sum of both.
-//! Each grows with every step, by an ulp at least; their sum need not, where the one is far larger than what the other
-//! goes, and what has come to touch would count as apart.
+//! In: the sums at one moment and at another. Out: by how much the two may have come nearer since. Refused: one sum for
+//! both. Each sum grows with every step, by an ulp at least; a common sum may not if one is far larger than the other's
+//! step, and then a pair that has come to touch would count as apart.
 
 use crate::math::ROUND;
 use crate::shape::Shape;
 use crate::world::Body;
 
-/// What each of two has deformed since it was put, metres.
+/// What each of the two has deformed since it was inserted, metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Bent([f64; 2]);
 
@@ -21,14 +21,14 @@ impl Bent {
         Self([a.bent_m(), b.bent_m()])
     }
 
-    /// Of what is asked of the two as wholes: what their boxes drew back by counts, too, where that is more.
+    /// For tests of two whole shapes: what their boxes shrank by counts as well, if that is more.
     ///
     /// * `shed_m` - [`Shape::shed_m`] of both.
     pub(super) fn of_wholes(shed_m: [f64; 2]) -> Self {
         Self(shed_m)
     }
 
-    /// What the two have deformed since `then`, together, metres, rounded up; 0: neither has.
+    /// What the two have deformed since `then`, summed, metres, rounded up; 0: neither has.
     pub(super) fn since_m(&self, then: &Self) -> f64 {
         let [a, b] = [0, 1].map(|k| (self.0[k] - then.0[k]).max(0.0));
         (a + b) * (1.0 + 4.0 * ROUND)
@@ -49,7 +49,7 @@ mod tests {
     use crate::time::{ManualClock, Meter};
     use crate::world::World;
 
-    /// What the one has deformed is so much more than what the other goes that their sum does not grow.
+    /// One body's deformation is so much larger than the other's step that their sum would not grow.
     #[test]
     fn bug_what_a_body_deforms_is_not_lost_beside_what_another_has() {
         let text = "[[body]]\nname = \"a\"\nmoves = false\nshape = { type = \"sphere\", radius = 1.0 }\n\
@@ -81,7 +81,7 @@ mod tests {
         shape.to_deforming().unwrap()
     }
 
-    /// The same of the front of two meshes.
+    /// The same for the front of two meshes.
     #[test]
     fn bug_a_front_hears_of_a_small_step_beside_a_long_way() {
         let (mut a, mut b) = (sheet(0.0), sheet(0.0));
@@ -103,7 +103,7 @@ mod tests {
         b.bend(0, &at(-1e-4));
         front.move_to(&mut store, &a, &b, &pos12);
         assert!(front.interval().min <= 0.0, "{:?}", front.interval());
-        // One corner through the other sheet.
+        // Move one corner through the other sheet.
         b.bend(0, &[[-1.0, -1.0, -1e-4], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]]);
         front.move_to(&mut store, &a, &b, &pos12);
         assert!(front.advance(&mut store, &a, &b, Goal::Verdict, u64::MAX, &mut meter));

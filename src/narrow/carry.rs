@@ -1,9 +1,9 @@
-//! Pairs of single shapes of which one is a mesh: work on their fronts, and what it says of the bodies.
+//! Pairs of single shapes of which one is a mesh: work on their fronts, and what the fronts prove of the bodies.
 //!
-//! A front works at this tick's poses; what it had proved before is carried there. It stays behind, or is not begun,
-//! while a glance tells enough: a plane that parts the two, balls within them that overlap, or a touch where they
+//! A front works at this tick's poses; its earlier proofs are carried there. It is left as it is, or not started, while
+//! a cheap test (`glance`) is enough: a plane that separates the two, inner balls that overlap, or a touch where they
 //! touched last. The pair's memory is an interval with its own certificate, so a pair that has not moved enough is not
-//! looked at, and its front is not touched.
+//! visited, and its front is not read.
 
 use crate::ids::PairSlot;
 use crate::math::{Interval, Pose, relative};
@@ -19,19 +19,19 @@ use super::mesh::{CarriedFront, FrontStore, Goal, LeafContact, Search, lead_out,
 use super::query::{leaf_contact, lost_m, shape_pose, sound, witness_of};
 use super::widen::widened;
 
-/// What asking two triangles whether they surely cross costs, in tests of a box against a pack, with what it takes to
-/// come to them: when the clock is to be read.
+/// Cost of testing whether two triangles surely cross, including memory access, in tests of a box against a pack:
+/// decides when the clock is read.
 const RETEST_COST: u64 = 2;
 
-/// What taking a front to another pose costs in the same way, with what it takes to come to it from the pair before.
+/// Cost of carrying a front to another pose, in the same units, including the cache misses after the previous pair.
 pub(super) const CARRY_COST: u64 = 4;
 
-/// A pair's turn doubles with each tick it waits for its verdict, up to so many times: what motion undoes in a tick may
-/// be more than a plain turn, and then equal turns for all would decide it never.
+/// A pair's turn doubles with each tick that it waits for its verdict, at most this many times: motion may undo more
+/// per tick than a plain turn does, and equal turns for all would then never decide the pair.
 const SLICE_DOUBLINGS_MAX: u64 = 6;
 
 impl Narrow {
-    /// One turn of a pair on its front; whether there is more to do for `goal`.
+    /// One turn of a pair on its front. Returns whether there is more to do for `goal`.
     pub(super) fn turn_front(
         &mut self,
         slot: PairSlot,
@@ -67,7 +67,7 @@ impl Narrow {
                         memo.witness = Some(seen_at((one, other), (0, 0), &pos12, &leaf));
                     }
                     Glance::Touch(None) => {}
-                    // Where it touched or was nearest once is not where it does or is now.
+                    // The old place of touch or of least distance is out of date.
                     Glance::Deep(_) | Glance::Apart(_) | Glance::Nothing => memo.witness = None,
                 }
                 return false;
@@ -109,19 +109,19 @@ impl Narrow {
     }
 }
 
-/// What a front or a query has told of a pair at the poses it was asked at.
+/// What a front or a query has found for a pair at the poses it was tested at.
 #[derive(Debug)]
 pub(super) struct Told {
     pub(super) gap: Interval,
     /// The goal is reached.
     pub(super) done: bool,
-    /// 0 inside the interval of a reached goal means touching.
+    /// An interval of a reached goal that contains 0 means touching.
     pub(super) certain: bool,
     pub(super) witness: Option<Witness>,
 }
 
 impl Told {
-    /// Of what was not asked.
+    /// The result where nothing was tested.
     pub(super) const NOTHING: Self = Self {
         gap: Interval::UNKNOWN,
         done: false,
@@ -131,14 +131,14 @@ impl Told {
 }
 
 impl Memo {
-    /// It is asked at the poses of this tick: what is told of it holds there.
+    /// Records that the pair is tested at this tick's poses: the results hold there.
     pub(super) fn note_asked(&mut self, (a, b): (&Body, &Body), rel: &Pose, tick: u64) {
         self.rel = *rel;
         self.credit_m = a.motion.credit_m() + b.motion.credit_m();
         (self.bent, self.tested) = (Bent::of_bodies(a, b), tick);
     }
 
-    /// Takes over what a turn towards a goal told; false: it told nothing new.
+    /// Takes over the result of a turn towards a goal. Returns false if it said nothing new.
     pub(super) fn take_over(
         &mut self,
         told: &Told,
@@ -150,7 +150,7 @@ impl Memo {
         if !told.done && found.min <= here.min && found.max >= here.max {
             return false;
         }
-        // What was known before holds at these poses too.
+        // The earlier bound, carried here, holds at these poses too.
         self.gap = found.meet(here);
         self.note_asked((a, b), rel, tick);
         let whole = told.done && !(goal == Goal::Verdict && self.gap.max <= 0.0);
@@ -161,15 +161,15 @@ impl Memo {
         } else if self.gap.min > 0.0
             && (self.tight || self.witness.is_some_and(|w| w.best_m <= 0.0))
         {
-            // Where it touched says nothing of a pair that is apart, nor where it was nearest of bounds of these poses.
+            // Apart: an old touch means nothing, nor does an old nearest place next to tight bounds at these poses.
             self.witness = None;
         }
         true
     }
 }
 
-/// What a front found once its goal is a contact set and reached: points of touching leaves, with each the number of
-/// its patch; of a shape within another the way out.
+/// The contact points of a front whose goal, a contact set, is reached: points of touching leaves, each with the number
+/// of its patch; for a shape within another the way out.
 pub(super) fn found_on(
     front: &CarriedFront,
     store: &FrontStore,
@@ -179,7 +179,7 @@ pub(super) fn found_on(
     let found = front.contacts(store);
     let way_out = match found.first() {
         None => front.way_out(store),
-        // Nothing lies straight across: what stands for the pair is the nearest way out, where that is known.
+        // There are no opposite faces: the nearest way out stands for the pair, if it is known.
         Some(first) if first.patch == LeafContact::SPARE => front.witness(),
         Some(_) => None,
     };
@@ -190,7 +190,7 @@ pub(super) fn found_on(
     points.chain(alone.map(|point| (point, 0)))
 }
 
-/// Units of a turn of a pair without a verdict since a tick, 0 of one that is decided and asked for more.
+/// Units of a turn of a pair that has had no verdict since a tick; 0: decided, and worked on for more.
 pub(super) fn slice_units(undecided_since: u64, tick: u64) -> u64 {
     let waited = match undecided_since {
         0 => 0,
@@ -199,20 +199,20 @@ pub(super) fn slice_units(undecided_since: u64, tick: u64) -> u64 {
     SLICE_UNITS << waited.min(SLICE_DOUBLINGS_MAX)
 }
 
-/// What a glance at a pair says, without a search of its front.
+/// What is known of a pair without a search of its front.
 pub(super) enum Glance {
-    /// It touches still: where it did, or at these leaves.
+    /// It still touches: where it did before, or at these leaves.
     Touch(Option<LeafContact>),
-    /// Balls within the two overlap so deep, metres.
+    /// Inner balls of the two overlap by this depth, metres.
     Deep(f64),
-    /// A plane parts it by so much, metres.
+    /// A plane separates the two by this distance, metres.
     Apart(f64),
     /// Nothing.
     Nothing,
 }
 
 impl Glance {
-    /// The leaves that it touches at, where they were found just now.
+    /// The leaves that it touches at, if they were found just now.
     pub(super) fn leaf(&self) -> Option<LeafContact> {
         match *self {
             Self::Touch(leaf) => leaf,
@@ -220,13 +220,13 @@ impl Glance {
         }
     }
 
-    /// The pair's interval at these very poses.
+    /// The pair's interval at exactly these poses.
     ///
-    /// * `here` - what motion left of the one before: the lower end of a pair that touches.
-    /// * `sound` - makes a bound on the two shapes one on the two bodies.
+    /// * `here` - the previous interval, widened by motion: gives the lower end of a pair that touches.
+    /// * `sound` - turns a bound on the two shapes into one on the two bodies.
     pub(super) fn gap(&self, here: Interval, sound: impl Fn(Interval) -> Interval) -> Interval {
         match *self {
-            // A certified touch, whatever composing the poses lost; how deep it is at most has not been asked again.
+            // A certified touch, whatever composing the poses lost; the greatest depth has not been tested again.
             Self::Touch(_) => Interval::new(here.min.min(0.0), 0.0),
             Self::Deep(depth_m) => sound(Interval::new(f64::NEG_INFINITY, -depth_m)).meet(here),
             Self::Apart(low_m) => sound(Interval::new(low_m, f64::INFINITY)).meet(here),
@@ -235,10 +235,10 @@ impl Glance {
     }
 }
 
-/// Looks at a pair where it touched last, or else at what balls within the two, and then a plane, would say.
+/// Tests a pair where it touched last; otherwise inner balls, and then a separating plane.
 ///
-/// * `off_m` - how far the second may be from that pose for the two bodies, metres: a touch is one there, too.
-/// * `touched` - whether it touched when it was last looked at.
+/// * `off_m` - how far the second body's true pose may be from this pose, metres: a touch must hold there, too.
+/// * `touched` - whether it touched at the last test.
 pub(super) fn glance(
     front: &mut CarriedFront,
     (a, b): (&Shape, &Shape),
@@ -263,7 +263,7 @@ pub(super) fn glance(
     beside.map_or(Glance::Nothing, |leaf| Glance::Touch(Some(leaf)))
 }
 
-/// Two leaves as the witness of the bodies.
+/// Two leaves as a witness of the bodies.
 pub(super) fn seen_at(
     (one, other): (&PlacedShape, &PlacedShape),
     places: (u32, u32),

@@ -1,4 +1,4 @@
-//! By how much a gap may have changed since a test: by the relative pose of then, and by what was deformed.
+//! How much a gap may have changed since a test: from the relative pose then, and from deformation.
 
 use crate::math::{Point, Pose, ROUND, Vec3, chord, displacement};
 use crate::shape::Geometry;
@@ -6,8 +6,8 @@ use crate::world::Body;
 
 use super::bent::Bent;
 
-/// An upper bound on how much the gap of two bodies changed since a test, by their relative pose then and by how much
-/// they had deformed then, metres.
+/// An upper bound on how much the gap of two bodies changed since a test, from their relative pose and deformation at
+/// the test, metres.
 pub(super) fn changed_since(a: &Body, b: &Body, (then, bent): (&Pose, Bent), now: &Pose) -> f64 {
     let bent_m = Bent::of_bodies(a, b).since_m(&bent);
     let moved_m = relative_motion(a, b, then, now);
@@ -18,18 +18,18 @@ pub(super) fn changed_since(a: &Body, b: &Body, (then, bent): (&Pose, Bent), now
     }
 }
 
-/// An upper bound on how much the gap of two bodies changed between two relative poses, metres; what they deformed by
-/// meanwhile comes on top.
+/// An upper bound on how much the gap of two bodies changed between two relative poses, metres; deformation in between
+/// is added on top.
 ///
 /// The displacement of the smaller body's surface seen from the other; for a half-space the change of the centre's
-/// height above its plane, plus what the relative turn adds.
+/// height above its plane, plus what the relative rotation adds.
 ///
-/// Of a body of half-spaces and other shapes: the displacement of the bounded one seen from it. Every kind of gap
-/// changes by no more. Say no point of B moves by more than `d` as A sees it. A convex piece of B then reaches along no
-/// direction by more than `d` farther or less, and so do distance and least translation along it. A point of B under
-/// the surface of a solid of A comes nearer to that surface by `d` at most. And a ball of radius `r` within a solid of
-/// B about a point of A is, moved along, a ball about a point within `d` of that one, so it still holds a ball of
-/// `r - d` about it. How far A's own points move, seen from B, is nowhere asked: far out, that has no bound.
+/// If one body has half-spaces and other shapes: the displacement of the bounded body seen from it. Every kind of gap
+/// changes by no more. Proof: say no point of B moves by more than `d` as A sees it. The extent of a convex piece of B
+/// along any direction then changes by at most `d`, and so do distance and least translation along it. A point of B
+/// under the surface of a solid of A comes nearer to that surface by `d` at most. And a ball of radius `r` within a
+/// solid of B about a point of A moves to a ball about a point within `d` of that one, so it still holds a ball of
+/// radius `r - d` about it. The motion of A's own points seen from B is not used: far out it has no bound.
 pub(super) fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f64 {
     if then == now {
         return 0.0;
@@ -54,7 +54,7 @@ pub(super) fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f6
         (None, None) if !a.unbounded => {
             displacement(&then.inverse(), &now.inverse(), &a.centre, a.radius)
         }
-        // Two that have half-spaces are no pair.
+        // Two bodies that both have half-spaces are never a pair.
         (None, None) => f64::INFINITY,
     }
 }

@@ -1,19 +1,19 @@
-//! Two bodies of which at least one has several shapes: a front over pairs of their shapes, which is carried from pose
-//! to pose as that of two meshes is over triangles.
+//! Two bodies of which at least one has several shapes: a front over pairs of their shapes, carried from pose to pose
+//! as the front of two meshes is carried over triangles.
 //!
-//! In: two bodies, and one pose after the other of B seen from A. Out: a sound interval of their gap at the pose worked
-//! at, a witness, contacts. Stops after any unit, and goes on at the same pose or at another.
+//! In: two bodies, and successive poses of B seen from A. Out: a sound interval of their gap at the current pose, a
+//! witness, contacts. Stops after any unit, and continues at the same pose or at another.
 //!
 //! Every pair of shapes is covered by exactly one entry at any time (see `cover`). A leaf is a pair of shapes: one
-//! exact query of two convex ones; of a mesh and another a front of its own, which is carried too (`leaf`). So a robot
-//! of a hundred parts asks those few pairs of parts that are near one another, and of these those that have moved.
+//! exact query if both are convex; if one is a mesh, a front of its own, which is carried too (`leaf`). So a robot of a
+//! hundred parts tests only the few pairs of parts that are near one another, and of these those that have moved.
 //!
-//! The orders are those of two meshes: depth first, deepest overlap first, for a verdict; best first for the bounds;
+//! The search orders are those of two meshes: depth first, deepest overlap first, for a verdict; best first for bounds;
 //! depth first to the end for the contact set. Half-spaces fit into no box: each is a root of its own (`side`). Two
 //! bodies that both have one have no gap (law 3.2) and are no pair (`world/filters`).
 //!
 //! Refused: one tree of all triangles of all shapes of a body (shapes are shared between bodies, and a solid's inside
-//! and a convex shape's depth belong to the shape); asking all pairs of shapes (65,536 of each are allowed).
+//! and a convex shape's depth belong to the shape); testing all pairs of shapes (65,536 of each are allowed).
 
 mod leaf;
 mod side;
@@ -54,33 +54,33 @@ pub(super) struct CompoundFront {
     known: Known,
     /// Contacts found at this pose.
     found: Run,
-    /// What is kept of pairs of shapes of which one is a mesh, by their places.
+    /// Memory of the pairs of shapes of which one is a mesh, by their places.
     inner: Vec<Inner>,
-    /// Least gap that the two can have, metres.
+    /// Least possible gap of the two, metres.
     floor_m: f64,
-    /// What the two had deformed when they were last looked at.
+    /// The deformation of the two at the last move.
     bent: Bent,
     /// Settled: a goal was reached.
     wear: Wear,
 }
 
-/// What is known at the pose worked at.
+/// What is known at the current pose.
 #[derive(Clone, Copy, Debug)]
 struct Known {
-    /// The farthest goal asked for.
+    /// The strongest goal worked on.
     goal: Goal,
-    /// Least lower end of the pairs of shapes asked for that goal, and least upper end of all, metres.
+    /// Least lower end of the shape pairs queried for that goal, and least upper end of all, metres.
     low: f64,
     high: f64,
-    /// 0 inside the interval of every pair of shapes asked means that it touches.
+    /// 0 inside the interval of any queried pair of shapes means that it touches.
     certain: bool,
-    /// The best of those that the pairs of shapes asked for that goal told.
+    /// The best witness of the shape pairs queried for that goal.
     witness: Option<Witness>,
 }
 
 impl Known {
-    /// Takes the witness of a pair of shapes. Not by its upper end: a search that is cut off tells of that before it
-    /// has a witness.
+    /// Takes the witness of a pair of shapes if it is better. Not by the upper end of the interval: a search that is
+    /// cut off has that before it has a witness.
     fn take_witness(&mut self, told: Option<Witness>) {
         let best = [told, self.witness].into_iter().flatten();
         self.witness = best.min_by(|x, y| x.best_m.total_cmp(&y.best_m));
@@ -103,15 +103,15 @@ impl Default for Known {
 #[derive(Clone, Copy)]
 struct Asked {
     goal: Goal,
-    /// What is farther than this is of no interest for a verdict, metres.
+    /// Pairs farther apart than this do not matter for a verdict, metres.
     report_m: f64,
-    /// Of the meter, when the turn ends.
+    /// Reading of the meter at which the turn ends.
     end: u64,
 }
 
 impl CompoundFront {
-    /// Takes the pair to a pose of B seen from A, and to the vertices of now; what was proved is carried over as far as
-    /// it holds. The first time it starts there.
+    /// Moves the pair to a pose of B seen from A and to the present vertices; proofs are carried over as far as they
+    /// hold. The first call starts the front there.
     pub(super) fn move_to(&mut self, tools: &mut Tools<'_>, (a, b): (&Body, &Body), rel: &Pose) {
         let sides = (Side::of(a), Side::of(b));
         let bent = Bent::of_bodies(a, b);
@@ -146,9 +146,9 @@ impl CompoundFront {
         self.cover.arrive(&mut tools.shelves.store.entries);
     }
 
-    /// Goes on at the pose until the goal is reached (true), `slice_units` are spent, or the meter closes.
+    /// Works at this pose until the goal is reached (true), `slice_units` are spent, or the meter closes.
     ///
-    /// * `report_m` - what is farther is of no interest for a verdict, metres.
+    /// * `report_m` - pairs farther apart do not matter for a verdict, metres.
     ///
     /// Units: a box against a pack, a query of two convex shapes, and those of mesh pairs.
     pub(super) fn advance(
@@ -161,7 +161,7 @@ impl CompoundFront {
     ) -> bool {
         let sides = (&Side::of(a), &Side::of(b));
         if goal > self.known.goal {
-            // Pairs of shapes that touch, and the nearest, have been asked for less.
+            // Shape pairs that touch, and the nearest ones, were queried for less.
             let high = self.known.high;
             self.known = Known {
                 goal,
@@ -190,7 +190,7 @@ impl CompoundFront {
         }
     }
 
-    /// What is known of the gap at this pose, metres: sound at any interruption.
+    /// Interval of the gap at this pose, metres: sound at any interruption.
     pub(super) fn interval(&self) -> Interval {
         let Known { low, high, .. } = self.known;
         let low = if self.cover.open.is_empty() {
@@ -215,12 +215,12 @@ impl CompoundFront {
         self.started && (self.cover.is_lost() || fronts.any(CarriedFront::is_lost))
     }
 
-    /// Where the pair of shapes that is nearest or deepest of those asked at this pose is so.
+    /// The witness of the nearest or deepest pair of shapes queried at this pose.
     pub(super) fn witness(&self) -> Option<Witness> {
         self.known.witness
     }
 
-    /// The front of a pair of shapes by their places, where there is one.
+    /// The front of a pair of shapes by their places, if there is one.
     pub(super) fn front_of<'a>(
         &self,
         shelves: &'a Shelves,
@@ -231,7 +231,7 @@ impl CompoundFront {
         front.is_started().then_some(front)
     }
 
-    /// Forgets everything and gives its memory back.
+    /// Forgets everything and releases its memory.
     pub(super) fn release(&mut self, shelves: &mut Shelves) {
         self.cover.release(&mut shelves.store.entries);
         shelves.contacts.release(&mut self.found);
@@ -241,7 +241,7 @@ impl CompoundFront {
         self.started = false;
     }
 
-    /// Tells what it holds beside the fronts and queries of its pairs of shapes.
+    /// Lists what it holds in addition to the fronts and queries of its pairs of shapes.
     pub(super) fn tell<'a>(&'a self, held: &mut Holdings<'a>) {
         held.covers.push(&self.cover);
         held.contacts.push(&self.found);
@@ -252,7 +252,7 @@ impl CompoundFront {
         self.inner.iter().map(Inner::held)
     }
 
-    /// Everything from the roots, at the pose it is at.
+    /// Starts over from the roots, at the current pose.
     fn start_over(&mut self, tools: &mut Tools<'_>, (a, b): (&Side<'_>, &Side<'_>)) {
         let entries = &mut tools.shelves.store.entries;
         let pairs_with = |of_a| b.roots().map(move |of_b| (of_a, of_b));
@@ -262,7 +262,7 @@ impl CompoundFront {
         self.found.clear();
         self.wear = Wear::default();
         self.take_floor([a.body.radius, b.body.radius]);
-        // Of pairs of shapes that were not asked since the last fresh start nothing is kept.
+        // Pairs of shapes that were not queried since the last fresh start are forgotten.
         self.inner.retain_mut(|inner| {
             let asked = std::mem::take(&mut inner.asked);
             if !asked {
@@ -272,8 +272,8 @@ impl CompoundFront {
         });
     }
 
-    /// Pieces part when moved by both radii, and a point within a solid is no deeper than it is large. Radii change
-    /// where a body deforms.
+    /// Convex pieces separate when moved by the sum of both radii, and a point within a solid is no deeper than the
+    /// solid's size. Radii change when a body deforms.
     fn take_floor(&mut self, radii_m: [f64; 2]) {
         let size_m: f64 = radii_m.iter().sum();
         self.floor_m = -size_m * (1.0 + 8.0 * f64::EPSILON) - self.at.slop;
@@ -291,7 +291,7 @@ impl CompoundFront {
             || nearest_m + self.cover.fuzz_m() + self.at.slop >= self.known.low
     }
 
-    /// What is farther than this is of no interest for a goal, metres.
+    /// Pairs farther apart than this do not matter for a goal, metres.
     fn margin_m(&self, goal: Goal, asked: &Asked) -> f64 {
         match goal {
             Goal::Verdict => asked.report_m,
@@ -314,14 +314,14 @@ impl CompoundFront {
         }
         let expired = self.cover.has_expired();
         if !expired {
-            // For a verdict too, where it is whether they are near: what is found is to hold to the last digit.
+            // For a `near` verdict too, what is found must hold exactly.
             self.cover.anchor_here(entries, &self.at.pos12);
         }
         let Some(group) = self.cover.proved.pop(&mut entries.groups) else {
-            // Not reached: where nothing is left the goal is.
+            // Not reached: with nothing left to open, the goal is reached.
             return meter.charge(1);
         };
-        // What is stored holds at this pose; a new test may be lower by rounding.
+        // The stored bound holds at this pose; a new test may be lower by rounding.
         let known_m = if expired {
             f64::NEG_INFINITY
         } else {

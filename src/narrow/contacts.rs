@@ -1,4 +1,4 @@
-//! Contacts of a pair, and the ids that stay while the contact does.
+//! Contacts of a pair, with ids that last as long as the contact.
 
 mod choose;
 mod patches;
@@ -15,7 +15,7 @@ use super::{NONE, Narrow};
 /// One point of contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// Stays while the contact does; 0: not named yet (see [`Narrow::name_contacts`]).
+    /// Constant while the contact lasts; 0: not named yet (see [`Narrow::name_contacts`]).
     pub id: u64,
     /// Place of the shape in A.
     pub shape_a: u32,
@@ -25,9 +25,9 @@ pub struct Contact {
     pub triangle_a: u32,
     /// Triangle of B's shape, or `NO_INDEX`.
     pub triangle_b: u32,
-    /// What of the shapes touches; equal features of two shapes are the same contact.
+    /// Which features of the shapes touch; equal features of two shapes are the same contact.
     pub feature: u64,
-    /// Which points of the shape pair came in together: those of one surface, with much the same normal.
+    /// Groups points of the shape pair that were found together: on one surface, with nearly the same normal.
     pub patch: u32,
     /// On A's surface, A's body frame, metres.
     pub point_a: Point,
@@ -61,20 +61,20 @@ pub struct ContactSet {
     contacts: Vec<Contact>,
 }
 
-/// Two points of one shape pair this close, as a share of the smaller body's radius, are the same contact when no
-/// feature says so: larger, and distinct corners of a face would trade ids; smaller, and a rolling contact would
+/// Two points of one shape pair closer than this, as a share of the smaller body's radius, are the same contact if no
+/// feature identifies them: larger, and distinct corners of a face would swap ids; smaller, and a rolling contact would
 /// change its id in every tick.
 const SAME_POINT: f64 = 0.05;
 
-/// Cosine of 8 degrees: what normals of one patch differ by at most.
+/// Cosine of 8 degrees: the most that normals of one patch differ by.
 pub(super) const SAME_NORMAL: f64 = 0.99;
-/// What was kept in the tick before counts as this much farther away: without it two equally good points would take
-/// turns, and ids with them.
+/// Contacts kept in the last tick count as this much farther away: without it, two equally good points would alternate,
+/// and their ids with them.
 const KEPT_BEFORE: f64 = 1.25;
-/// Ticks for which ids outlive a collision whose bodies stay near: a body that trembles at rest keeps them, one that
-/// comes back makes new contacts.
+/// Ticks for which ids outlive a collision whose bodies stay near: a body that trembles at rest keeps its ids, one that
+/// comes back later gets new contacts.
 pub(super) const TREMBLE_TICKS: u64 = 8;
-/// Cosine of 45 degrees: a contact whose normal has turned by more is another one.
+/// Cosine of 45 degrees: a contact whose normal has turned by more is a new one.
 const SAME_SIDE: f64 = 0.7;
 
 impl ContactSet {
@@ -90,16 +90,16 @@ impl ContactSet {
         &self.contacts
     }
 
-    /// Forgets all contacts, ids too.
+    /// Forgets all contacts, including ids.
     pub(super) fn clear(&mut self) {
         self.contacts.clear();
     }
 
-    /// Takes at most four points of each patch, and of those at most `most`: the deepest and those that span the most.
-    /// Contacts that were there before keep their ids. `before` is scratch memory.
+    /// Keeps at most four points of each patch, and of those at most `most`: the deepest and those that span the most.
+    /// Contacts that existed before keep their ids. `before` is scratch memory.
     ///
-    /// `most` is shared by spread, not by quota: the deepest of all comes first, then what lies farthest from what is
-    /// kept in place and in normal, so that no patch has a second point while another far from it has none.
+    /// `most` is shared by spread, not by quota: the deepest of all comes first, then the one farthest, in place and in
+    /// normal, from those kept, so that no patch has a second point while another far from it has none.
     pub(super) fn replace(
         &mut self,
         found: &mut [Contact],
@@ -116,7 +116,7 @@ impl ContactSet {
         found.sort_unstable_by(|x, y| x.gap_m.total_cmp(&y.gap_m).then(x.key().cmp(&y.key())));
         let kept = choose(found, most, radius, was_kept);
         self.contacts.extend_from_slice(&found[..kept]);
-        // First those of equal name, so that no other takes an id that is spoken for.
+        // Equal keys first, so that no other contact takes their id.
         for contact in &mut self.contacts {
             let heir = |old: &Contact| old.id != 0 && old.key() == contact.key();
             if let Some(at) = before.iter().position(heir) {
@@ -124,7 +124,7 @@ impl ContactSet {
             }
         }
         for contact in self.contacts.iter_mut().filter(|contact| contact.id == 0) {
-            // On one of the two it has stayed where it was: something slides on the other.
+            // It has stayed in place on one of the two bodies: they slide on each other.
             let heir = |old: &Contact| {
                 let moved = (old.point_a - contact.point_a).norm();
                 let moved = moved.min((old.point_b - contact.point_b).norm());
@@ -141,16 +141,16 @@ impl ContactSet {
 }
 
 impl Contact {
-    /// Its name among the contacts of the pair: triangles are no part of it, for a corner that slides over a mesh is
-    /// the same contact on each of them.
+    /// Its key among the contacts of the pair, without triangles: a corner that slides over a mesh is the same contact
+    /// on each of them.
     fn key(&self) -> (u32, u32, u64) {
         (self.shape_a, self.shape_b, self.feature)
     }
 }
 
 impl Narrow {
-    /// The contacts of a pair, deepest first; empty when none were asked for, or what is known is of a collision that
-    /// has ended. With them the tick of their poses.
+    /// The contacts of a pair, deepest first; empty when none were wanted, or the collision they belong to has ended.
+    /// With them the tick of their poses.
     #[must_use]
     pub fn contacts(&self, slot: PairSlot) -> (&[Contact], u64) {
         let memo = self.memos.get(slot.index());
@@ -161,8 +161,8 @@ impl Narrow {
         (set.map_or(&[], ContactSet::contacts), memo.contacts_tick)
     }
 
-    /// Names the contacts of a pair that have no id yet. Called in the order of publishing, so that ids do not depend
-    /// on slots.
+    /// Gives ids to the pair's contacts that have none. Called in the order of publishing, so that ids do not depend on
+    /// slots.
     pub fn name_contacts(&mut self, slot: PairSlot, next_id: &mut u64) {
         let Some(memo) = self
             .memos
@@ -181,7 +181,7 @@ impl Narrow {
     }
 }
 
-/// A contact of two shapes of one pair, for tests: its place on A's upper side, named by a number.
+/// A contact of two shapes of one pair, for tests: placed on A's upper side, identified by a number.
 #[cfg(test)]
 fn at_place(x: f64, y: f64, gap_m: f64, name: u32) -> Contact {
     Contact {

@@ -1,15 +1,15 @@
-//! What is proved of a pair: every pair of leaves is covered by exactly one entry at any time, at whatever pose.
+//! The proofs of a pair: every pair of leaves is covered by exactly one entry at any time, at any pose.
 //!
-//! In: gaps of boxes at the pose worked at. Out: the next boxes to look into, a sound bound on all of them. An entry is
+//! In: gaps of boxes at the current pose. Out: the next boxes to open, a sound bound on all of them. An entry is
 //! - a [`Group`] of pairs of boxes proved apart by `g` when the pair's path was `M`: it holds while the path is less
-//!   than `g + M`, at no cost; the group that expires soonest is on top of a heap, so the heap is at once the front,
-//!   the best-first queue and the bound;
+//!   than `g + M`, at no cost. The group that expires soonest is on top of a heap, so the heap is the front, the
+//!   best-first queue and the bound at once;
 //! - an open pair of boxes that may touch;
 //! - a group apart at this pose by less than can be carried to another, or a pair of leaves found touching: at the next
 //!   pose it is open again;
-//! - what was lumped together when there was no room: one expiry for all of it, and a new start when that is up.
+//! - everything lumped together when there was no room: one expiry for all of it, after which the pair starts over.
 //!
-//! What boxes and leaves are is its user's: triangles of two meshes (`mesh/carried`), shapes of two bodies
+//! The user defines what boxes and leaves are: triangles of two meshes (`mesh/carried`), shapes of two bodies
 //! (`compound`).
 
 mod drift;
@@ -29,7 +29,7 @@ use crate::time::Meter;
 
 use super::arena::{Arena, Run};
 
-/// Where all pairs keep their entries.
+/// The entries of all pairs.
 #[derive(Debug)]
 pub(super) struct Entries {
     pub(super) groups: Arena<Group>,
@@ -37,7 +37,7 @@ pub(super) struct Entries {
 }
 
 impl Entries {
-    /// At most so many of all pairs together.
+    /// Room for at most this many entries of all pairs together.
     pub(super) fn with_room(groups: usize, open: usize) -> Self {
         Self {
             groups: Arena::new(groups),
@@ -63,14 +63,14 @@ pub(super) struct Cover {
     pub(super) drift: Drift,
     pub(super) proved: Proved,
     pub(super) open: OpenList,
-    /// Apart at this pose by what stands for the expiry, and by no more than can be told at another.
+    /// Groups apart at this pose (their expiry is the gap), but by too little to be certified at another.
     pub(super) passing: Run,
-    /// The least gap of them, metres; infinite: there are none.
+    /// Their least gap, metres; infinite: there are none.
     passing_m: f64,
     /// Leaves found touching at this pose.
     pub(super) touching: Run,
-    /// When what was lumped together is no longer proved apart; infinite: nothing was; minus infinity: something found
-    /// no room at all, and nothing is proved until the next start.
+    /// Expiry of the lumped entries; infinite: there are none; minus infinity: an entry found no room at all, and
+    /// nothing is proved until the next start.
     lumped_expiry_m: f64,
 }
 
@@ -89,7 +89,7 @@ impl Default for Cover {
 }
 
 impl Cover {
-    /// Forgets everything: at a pose these pairs of roots are open, which everything is below.
+    /// Forgets everything: at this pose these pairs of roots, which everything is below, are open.
     pub(super) fn start(
         &mut self,
         entries: &mut Entries,
@@ -108,7 +108,7 @@ impl Cover {
         }
     }
 
-    /// Gives its memory back.
+    /// Releases its memory.
     pub(super) fn release(&mut self, entries: &mut Entries) {
         self.proved.release(&mut entries.groups);
         entries.groups.release(&mut self.passing);
@@ -121,22 +121,22 @@ impl Cover {
         self.proved.len() + self.open.len() + self.passing.len() + self.touching.len()
     }
 
-    /// Whether some were lumped together.
+    /// Whether some entries were lumped together.
     pub(super) fn is_lumped(&self) -> bool {
         self.lumped_expiry_m < f64::INFINITY
     }
 
-    /// Whether what was lumped together is no longer proved apart, so that nothing but a new start helps.
+    /// Whether the lumped entries are no longer proved apart, so that only a new start helps.
     pub(super) fn is_lost(&self) -> bool {
         self.is_lumped() && !self.holds_lumped()
     }
 
-    /// Whether what was lumped together is still proved apart, if anything was.
+    /// Whether the lumped entries, if any, are still proved apart.
     pub(super) fn holds_lumped(&self) -> bool {
         self.drift.left_m(self.lumped_expiry_m) > 0.0
     }
 
-    /// The pair has come to another pose: what held at the one before alone is asked again.
+    /// The pair has come to another pose: entries that held only at the previous one are retested.
     pub(super) fn arrive(&mut self, entries: &mut Entries) {
         self.ask_touching_again(entries);
         while let Some(group) = entries.groups.pop(&mut self.passing) {
@@ -145,32 +145,32 @@ impl Cover {
         self.passing_m = f64::INFINITY;
     }
 
-    /// Leaves that were found touching are open again.
+    /// Leaves that were found touching are opened again.
     pub(super) fn ask_touching_again(&mut self, entries: &mut Entries) {
         while let Some(touching) = entries.open.pop(&mut self.touching) {
             self.look_into(entries, touching);
         }
     }
 
-    /// Takes an anchor at this pose: from here on what is found holds at it to the last digit.
+    /// Sets an anchor at this pose: what is found from here on holds at it exactly.
     pub(super) fn anchor_here(&mut self, entries: &mut Entries, pose: &Pose) {
         if !self.drift.anchor_here(pose) {
             return;
         }
         self.passing_m = f64::INFINITY;
         for at in (0..self.passing.len()).rev() {
-            // What does not outlast this pose after all is put back: behind those that are still to come.
+            // What does not outlast this pose after all is put back, behind the entries that are still to come.
             if let Some(group) = entries.groups.swap_remove(&mut self.passing, at) {
                 self.keep(entries, group, group.expiry_m);
             }
         }
     }
 
-    /// Takes the outcome of a group's test in: what is apart is a group again, what may touch is open, the deepest on
-    /// top.
+    /// Applies the result of a group's test: pairs that are apart form a group again, pairs that may touch are opened,
+    /// the deepest on top.
     ///
     /// * `gaps` - of the group's pairs at this pose, lane by lane.
-    /// * `known_m` - a bound that holds for all of it at this pose.
+    /// * `known_m` - a bound that holds for the whole group at this pose.
     pub(super) fn take(
         &mut self,
         entries: &mut Entries,
@@ -180,8 +180,8 @@ impl Cover {
     ) {
         let gaps = gaps.map(|gap| gap.max(known_m));
         let (mut apart, mut least) = (0_u8, f64::INFINITY);
-        // What would not outlast this pose is looked into: smaller boxes are farther apart. Without a branch: which of
-        // them are apart is as good as random.
+        // Entries that would not outlast this pose are opened: smaller boxes are farther apart. Branch-free: which of
+        // them are apart is practically random.
         let lasting_m = if known_m > 0.0 {
             f64::NEG_INFINITY
         } else {
@@ -196,7 +196,7 @@ impl Cover {
         let mut count = 0;
         for lane in lanes(group.mask & !apart) {
             let gap = gaps[lane as usize];
-            // Sorted in: the deepest last.
+            // Insertion sort: the deepest last.
             let mut at = count;
             while at > 0 && deep[at - 1].0 < gap {
                 deep[at] = deep[at - 1];
@@ -215,7 +215,7 @@ impl Cover {
         }
     }
 
-    /// Keeps all of a group but its nearest pair, which is returned with its gap.
+    /// Keeps all of a group except its nearest pair, which is returned with its gap.
     ///
     /// * `gaps` - of the group's pairs at this pose, lane by lane.
     pub(super) fn part_nearest(
@@ -240,7 +240,7 @@ impl Cover {
         (group.pair(nearest), gaps[nearest as usize])
     }
 
-    /// Keeps a group that is apart by `gap` at this pose; where there is no room, only its expiry.
+    /// Keeps a group that is apart by `gap` at this pose; if there is no room, only its expiry.
     pub(super) fn keep(&mut self, entries: &mut Entries, group: Group, gap: f64) {
         match self.drift.expiry(gap) {
             Some(expiry_m) => self.prove(entries, Group { expiry_m, ..group }),
@@ -250,7 +250,7 @@ impl Cover {
                 let kept = (entries.groups).push(&mut self.passing, Group { expiry_m, ..group });
                 self.note_room(kept);
             }
-            // Not apart after all: every pair stays covered.
+            // Not apart after all: open every pair, so that it stays covered.
             None => {
                 for lane in lanes(group.mask) {
                     let (a, b) = group.pair(lane);
@@ -260,33 +260,33 @@ impl Cover {
         }
     }
 
-    /// Takes a group in until it expires.
+    /// Stores a group until it expires.
     fn prove(&mut self, entries: &mut Entries, group: Group) {
         if !self.proved.push(&mut entries.groups, group) {
             self.lumped_expiry_m = self.lumped_expiry_m.min(group.expiry_m);
         }
     }
 
-    /// Takes a pair in that may touch.
+    /// Stores a pair that may touch.
     pub(super) fn look_into(&mut self, entries: &mut Entries, open: Open) {
         let kept = self.open.push(&mut entries.open, open);
         self.note_room(kept);
     }
 
-    /// Takes a pair of leaves in that was found touching at this pose.
+    /// Stores a pair of leaves that was found touching at this pose.
     pub(super) fn touch(&mut self, entries: &mut Entries, touching: Open) {
         let kept = entries.open.push(&mut self.touching, touching);
         self.note_room(kept);
     }
 
-    /// What found no room is no longer covered: then nothing is proved until the next start.
+    /// An entry that found no room is no longer covered: nothing is proved until the next start.
     fn note_room(&mut self, kept: bool) {
         if !kept {
             self.lumped_expiry_m = f64::NEG_INFINITY;
         }
     }
 
-    /// A lower bound on the gap of all that is proved apart at this pose, metres; minus infinity where some is not.
+    /// A lower bound on the gap of all that is proved apart at this pose, metres; minus infinity if some of it is not.
     pub(super) fn low_m(&self) -> f64 {
         let soonest_m = self.proved.soonest_m().min(self.lumped_expiry_m);
         let proved = self.drift.left_m(soonest_m).min(self.passing_m);
@@ -302,20 +302,20 @@ impl Cover {
         self.nearest_m() <= 0.0
     }
 
-    /// The least bound of what can still be looked into, metres.
+    /// The least bound of the groups that can still be opened, metres.
     pub(super) fn nearest_m(&self) -> f64 {
         self.drift.left_m(self.proved.soonest_m())
     }
 
-    /// What expiries cannot tell apart, metres.
+    /// Expiries closer together than this cannot be distinguished, metres.
     pub(super) fn fuzz_m(&self) -> f64 {
         16.0 * ROUND * self.drift.path_m
     }
 
-    /// Visits every pair of boxes that is not proved apart at a pose `moved_m` away from the one worked at. All that
-    /// the two share at that pose is under these.
+    /// Visits every pair of boxes that is not proved apart at a pose `moved_m` away from the current one. All that the
+    /// two share at that pose is below these.
     ///
-    /// * returns - false where some pairs were lumped together and are not known any more: then nothing is visited.
+    /// * returns - false if some pairs were lumped together, so that they are no longer known: then nothing is visited.
     pub(super) fn unproved(
         &self,
         entries: &Entries,
@@ -328,7 +328,7 @@ impl Cover {
         for open in self.unsettled(entries) {
             visit(open.a, open.b);
         }
-        // Of groups that pass, the expiry is their gap at this pose.
+        // For passing groups, the expiry is their gap at this pose.
         let passing = entries.groups.all(&self.passing).iter();
         let passed = passing.filter(|group| group.expiry_m <= moved_m);
         let any = self.nearest_m() <= moved_m;
@@ -347,7 +347,7 @@ impl Cover {
         true
     }
 
-    /// Visits every pair of boxes that is covered; `false` where some were lumped together for want of room.
+    /// Visits every pair of boxes that is covered; `false` if some were lumped together because there was no room.
     pub(super) fn visit_all(&self, entries: &Entries, mut visit: impl FnMut(BoxId, BoxId)) -> bool {
         if self.is_lumped() {
             return false;

@@ -1,9 +1,9 @@
 //! A resumable query of two shapes of two bodies at one pose: one exact query, or a walk over a mesh.
 //!
-//! A cursor keeps the relative pose it was started at; whatever it has found holds at that pose, and its certificate
-//! carries the motion accumulators of that moment, so that interrupted work stays valid after the bodies have moved.
-//! What has a front is carried from pose to pose instead (`carry`, `compound`): cursors are for half-spaces, and for
-//! whoever asks once.
+//! A cursor keeps the relative pose it was started at; whatever it finds holds at that pose, and its certificate has
+//! the motion accumulators of that moment, so that interrupted work stays valid after the bodies have moved. Pairs with
+//! a front are carried from pose to pose instead (`carry`, `compound`): cursors are for half-spaces, and for queries on
+//! demand.
 
 use crate::math::{Interval, Pose};
 use crate::time::Meter;
@@ -30,8 +30,8 @@ pub(super) const SLICE_UNITS: u64 = 32;
 pub(super) struct Cursor {
     /// Pose of B's body seen from A's, at the start.
     pub(super) rel: Pose,
-    /// What both bodies had deformed by at the start. What is found later is of the vertices of then: it holds
-    /// for those of any other moment since the start when it is widened by what was deformed since the start.
+    /// The deformation of both bodies at the start. Later results refer to the vertices at the start: they hold for
+    /// those of any later moment when widened by the deformation since.
     pub(super) bent: Bent,
     /// Sum of both bodies' `S - d` at the start.
     pub(super) credit_m: f64,
@@ -43,7 +43,7 @@ pub(super) struct Cursor {
     pub(super) gap: Interval,
     /// Whether 0 inside the interval of a finished query means touching.
     pub(super) certain: bool,
-    /// Where it is.
+    /// Its nearest or deepest place.
     pub(super) witness: Option<Witness>,
     /// Contacts found so far.
     found: Run,
@@ -56,7 +56,7 @@ pub(super) struct Cursor {
     finished: bool,
 }
 
-/// Where cursors keep what they find.
+/// Where cursors store what they find.
 #[derive(Debug)]
 pub(super) struct Room<'a> {
     pub(super) fronts: &'a mut FrontStore,
@@ -85,7 +85,7 @@ impl Default for Cursor {
     }
 }
 
-/// How far a turn of a cursor came.
+/// The outcome of a turn of a cursor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Turn {
     /// The goal is reached.
@@ -95,7 +95,7 @@ pub(super) enum Turn {
 }
 
 impl Cursor {
-    /// Starts over: two shapes by their places, at a relative pose of their bodies, which have deformed so much.
+    /// Starts over: two shapes by their places, at a relative pose and deformation of their bodies.
     pub(super) fn start(
         &mut self,
         places: (u32, u32),
@@ -116,13 +116,13 @@ impl Cursor {
         (self.under_way, self.finished) = (false, false);
     }
 
-    /// Gives its memory back.
+    /// Releases its memory.
     pub(super) fn release(&mut self, fronts: &mut FrontStore, contacts: &mut Arena<Contact>) {
         self.meshes.release(fronts);
         contacts.release(&mut self.found);
     }
 
-    /// Tells what it holds.
+    /// Lists what it holds.
     pub(super) fn tell<'a>(&'a self, held: &mut Holdings<'a>) {
         self.meshes.tell(held);
         held.contacts.push(&self.found);
@@ -133,7 +133,7 @@ impl Cursor {
         contacts.all(&self.found)
     }
 
-    /// What is known of the gap of the bodies at the start's pose, from whatever is done by now.
+    /// What is known so far of the gap of the bodies at the start's pose.
     ///
     /// `one` and `other` are those of [`Cursor::turn`].
     pub(super) fn known(&self, (one, other): (&PlacedShape, &PlacedShape)) -> Interval {
@@ -190,7 +190,7 @@ impl Cursor {
         Turn::Finished
     }
 
-    /// What is told of the two without a query, where it is enough for a verdict.
+    /// What is known of the two without a query, if it is enough for a verdict.
     fn glance(
         &self,
         search: Search,
@@ -223,7 +223,7 @@ impl Cursor {
         Some(sound(deep, one, other, &self.rel))
     }
 
-    /// The one query that decides two shapes without meshes.
+    /// Runs the single query that decides two shapes without meshes.
     fn query_once(&mut self, (one, other): (&PlacedShape, &PlacedShape), pos12: &Pose) {
         let mut warm = Warm::default();
         let Some(closest) = shape_gap(&one.shape, &other.shape, pos12, &mut warm) else {
@@ -234,7 +234,7 @@ impl Cursor {
         self.witness = Some(witness_of(one, other, pos12, &closest, self.places));
     }
 
-    /// Takes over what a finished query of a mesh pair found.
+    /// Takes over the result of a finished query of a mesh pair.
     fn take_meshes(
         &mut self,
         room: &mut Room<'_>,

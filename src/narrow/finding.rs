@@ -1,4 +1,4 @@
-//! What the narrow phase says of a pair, for whoever publishes it. In: a pair's slot. Out: a [`Finding`].
+//! What the narrow phase reports of a pair to `publish` and others. In: a pair's slot. Out: a [`Finding`].
 
 use crate::ids::{BodySlot, PairSlot};
 use crate::math::Interval;
@@ -21,9 +21,9 @@ pub struct Finding<'a> {
     pub gap: Interval,
     /// Nearest or deepest place at the last test.
     pub witness: Option<&'a Witness>,
-    /// How far work came.
+    /// How far work got.
     pub level: Level,
-    /// Finished, with 0 inside the rounding interval.
+    /// Finished, and 0 lies inside the rounding interval.
     pub touching: bool,
     /// Tick of the poses that the bound was computed at; 0: boxes only.
     pub tested: u64,
@@ -67,22 +67,22 @@ impl Narrow {
         })
     }
 
-    /// Pairs whose verdict is not `apart`, in no order that means anything.
+    /// Pairs whose verdict is not `apart`, in no particular order.
     #[must_use]
     pub fn active(&self) -> &[PairSlot] {
         &self.active
     }
 
-    /// Pairs that have become active since [`Narrow::clear_entered`]; they may have stopped, or be others by now.
+    /// Pairs that became active since [`Narrow::clear_entered`]; by now they may be inactive, or the slot reused.
     #[must_use]
     pub fn entered(&self) -> &[PairSlot] {
         &self.entered
     }
 
-    /// What became active was taken down.
+    /// The entered pairs have been read.
     pub fn clear_entered(&mut self) {
         self.entered.clear();
-        // How many do differs from tick to tick: room for all of them is made when they are more than ever.
+        // Their number differs from tick to tick: the capacity follows the largest number of active pairs.
         self.entered.reserve(self.active.len());
     }
 
@@ -92,32 +92,32 @@ impl Narrow {
         (self.hot.get(slot.index())).is_some_and(|hot| hot.live && hot.verdict != Verdict::Apart)
     }
 
-    /// Pairs that were active, in the tick before or after its findings were taken, and are now proved apart.
+    /// Pairs that were active in the last tick, or after its findings were published, and are now proved apart.
     #[must_use]
     pub fn left(&self) -> &[PairSlot] {
         &self.left
     }
 
-    /// Pairs whose verdicts changed in the last [`Narrow::go_on`]: of the tick's poses, when its findings were taken
-    /// already. Of no meaning once the next tick has begun.
+    /// Pairs whose verdicts changed in the last [`Narrow::go_on`]: at this tick's poses, but after its findings were
+    /// published. Meaningless once the next tick has begun.
     #[must_use]
     pub fn late(&self) -> &[PairSlot] {
         &self.late
     }
 
-    /// Whether what there is to say of a pair may have changed since [`Narrow::told`]: it was looked at or worked on, a
-    /// body of it moved, or its slot holds another pair.
+    /// Whether the finding of a pair may have changed since [`Narrow::told`]: it was visited or worked on, a body of it
+    /// moved, or its slot holds another pair.
     #[must_use]
     pub fn is_stirred(&self, slot: PairSlot) -> bool {
         self.stirred.has(slot)
     }
 
-    /// What is known of a pair has been taken down.
+    /// The pair's finding has been published.
     pub fn told(&mut self, slot: PairSlot) {
         self.stirred.clear(slot);
     }
 
-    /// Says that [`Narrow::finding`] of a pair is wanted soon.
+    /// Prefetches what [`Narrow::finding`] of a pair reads.
     #[inline]
     pub fn ask_ahead(&self, slot: PairSlot) {
         if let (Some(hot), Some(memo)) = (self.hot.get(slot.index()), self.memos.get(slot.index()))
@@ -127,7 +127,7 @@ impl Narrow {
         }
     }
 
-    /// Says that [`Narrow::contacts`] of a pair are wanted soon.
+    /// Prefetches what [`Narrow::contacts`] of a pair reads.
     #[inline]
     pub fn ask_ahead_for_contacts(&self, slot: PairSlot) {
         let memo = self.memos.get(slot.index());

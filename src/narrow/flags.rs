@@ -1,11 +1,11 @@
-//! One flag for each pair, side by side, so that those of all pairs are a few lines of memory.
+//! One flag per pair, packed as bits, so that the flags of all pairs fit into a few cache lines.
 
 use crate::ids::PairSlot;
 
-/// Flags by `PairSlot`; of a pair that none was ever said of it is set.
+/// Flags by `PairSlot`; the flag of a pair that was never written is set.
 #[derive(Debug, Default)]
 pub(super) struct Flags {
-    /// Set bits are flags that are cleared.
+    /// A set bit means that the flag is cleared.
     clear: Vec<u64>,
 }
 

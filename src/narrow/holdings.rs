@@ -1,9 +1,9 @@
-//! Who holds which blocks of the arenas: what the structure check compares with the arenas' own books.
+//! The owners of the arenas' blocks: the structure check compares them with the arenas' own records.
 
 use super::arena::Run;
 use super::cover::Cover;
 
-/// What is held, by arena.
+/// Blocks held, by arena.
 #[derive(Debug, Default)]
 pub(super) struct Holdings<'a> {
     /// Groups and open pairs.

@@ -1,4 +1,4 @@
-//! What is remembered of a pair: its certificate, its verdict, its witness.
+//! What is stored of a pair: its certificate, verdict and witness.
 
 use crate::ids::{BodySlot, PairSlot};
 use crate::math::{Interval, Point, Pose, Vec3, relative};
@@ -21,13 +21,13 @@ pub(super) struct Hot {
     pub(super) a: BodySlot,
     /// Body with the larger id.
     pub(super) b: BodySlot,
-    /// The pair is proved apart (and not near) while `S + d` of both sum to less, metres; minus infinity: look closer.
+    /// Proved apart (and not near) while `S + d` of both sum to less than this, metres; minus infinity: visit it.
     pub(super) expiry_m: f64,
     /// Stamp of the tick of the last visit; 0: none.
     pub(super) visited: u32,
     pub(super) verdict: Verdict,
     pub(super) live: bool,
-    /// A shape of either is a mesh.
+    /// A shape of either body is a mesh.
     pub(super) meshed: bool,
 }
 
@@ -36,14 +36,14 @@ const _: () = assert!(
     "what the motion pass reads of a pair"
 );
 
-/// Everything else.
+/// The rest of a pair's memory.
 #[derive(Clone, Debug)]
 pub(super) struct Memo {
     /// Certified at the test's poses.
     pub(super) gap: Interval,
     /// Sum of both bodies' `S - d` at the test, metres.
     pub(super) credit_m: f64,
-    /// What both bodies had deformed at the test.
+    /// The deformation of both bodies at the test.
     pub(super) bent: Bent,
     /// Pose of B's body seen from A's at the test.
     pub(super) rel: Pose,
@@ -51,15 +51,15 @@ pub(super) struct Memo {
     pub(super) tested: u64,
     /// The query was finished at the test.
     pub(super) finished: bool,
-    /// The interval was narrowed as far as the exact query goes, not only as far as a verdict needed.
+    /// The interval was narrowed as far as the exact query can, not only as far as a verdict needed.
     pub(super) tight: bool,
-    /// Tick in which the witness was last asked again.
+    /// Tick in which the witness was last retested.
     pub(super) retested: u64,
     /// At this tick's poses.
     pub(super) now: Interval,
     /// Motion since the test that `now` was widened by, metres.
     pub(super) motion_m: f64,
-    /// Reach of both bodies that `now` was widened by, too, metres.
+    /// Reach of both bodies that `now` was also widened by, metres.
     pub(super) reach_m: f64,
     /// Nothing moved relative to the test's poses.
     pub(super) rest: bool,
@@ -76,22 +76,22 @@ pub(super) struct Memo {
     pub(super) witness: Option<Witness>,
     /// Where the next query starts from.
     pub(super) warm: Warm,
-    /// What the last query of a pair that takes one took, nanoseconds.
+    /// Duration of the pair's last query, if one query decides it, nanoseconds.
     pub(super) query_ns: u32,
     /// Tick of the poses the contacts belong to.
     pub(super) contacts_tick: u64,
-    /// First tick after those in which the pair was certified not to touch; 0: none.
+    /// First tick after `contacts_tick` in which the pair was certified not to touch; 0: none.
     pub(super) parted: u64,
     pub(super) active_at: u32,
     /// The surface that proved the last depth.
     pub(super) shell: u32,
-    /// Its walk for a verdict, where one of the two is a half-space, and that for whoever listens.
+    /// If one body is a half-space: the walk for a verdict, and the walk for listeners.
     pub(super) cursor: u32,
     pub(super) report_cursor: u32,
     pub(super) front: u32,
     pub(super) compound: u32,
     pub(super) contacts: u32,
-    /// Regions of the pair as they were last made to be kept.
+    /// The pair's regions as last stored.
     pub(super) regions: u32,
     /// Turns of work that the pair has had.
     pub(super) turns: u32,
@@ -155,18 +155,18 @@ impl Memo {
         }
     }
 
-    /// Finished at just these poses, and 0 cannot be told from the gap. An overlap that is proved is no touch, however
-    /// near 0 its upper end: that of meshes is a bound, not a depth.
+    /// Finished at exactly these poses, and the gap cannot be distinguished from 0. A proved overlap is not touching,
+    /// however near 0 its upper end: that of meshes is a bound, not a depth.
     pub(super) fn touching(&self) -> bool {
         self.finished && self.widened_m() == 0.0 && self.gap.contains(0.0) && self.gap.max > 0.0
     }
 
-    /// Whether the contacts are of a collision that has ended since: their ids may go on, their points are no more.
+    /// Whether the contacts belong to a collision that has ended since: their ids may continue, their points are void.
     pub(super) fn contacts_are_over(&self) -> bool {
         self.parted > self.contacts_tick
     }
 
-    /// The verdict that the interval of this tick allows.
+    /// The verdict that this tick's interval allows.
     pub(super) fn verdict(&self) -> Verdict {
         if self.now.max <= 0.0 || self.touching() {
             Verdict::Colliding
@@ -180,8 +180,8 @@ impl Memo {
     }
 }
 
-/// How far two bodies came nearer between the test's relative pose and this one, metres: along the witness, or along
-/// the line of their centres where there is none. For the order of work, no bound.
+/// How far two bodies approached between the test's relative pose and this one, metres: along the witness normal, or
+/// without a witness along the line of their centres. For the order of work; not a bound.
 pub(super) fn closing(a: &Body, b: &Body, memo: &Memo, rel: &Pose) -> f64 {
     let (point, direction) = match memo.witness {
         Some(witness) => (witness.point_b, witness.normal),
@@ -199,7 +199,7 @@ fn meshed(body: &Body) -> bool {
 }
 
 impl Narrow {
-    /// Starts the memory of a pair that has begun.
+    /// Starts the memory of a new pair.
     pub(super) fn meet(&mut self, slot: PairSlot, world: &World, pairs: &PairSet) {
         let Some(key) = pairs.get(slot) else { return };
         let (one, other) = key.slots();
@@ -261,9 +261,9 @@ impl Narrow {
         self.give_back(slot);
     }
 
-    /// Gives the memory of slots back that pairs have left, when they have been many for long.
+    /// Gives back the memory of slots that pairs have left, once they have been many for long.
     ///
-    /// * `slots` - those that the pair set has. No list names others.
+    /// * `slots` - the number that the pair set has. No list names slots beyond it.
     pub(super) fn give_back_slots(&mut self, slots: usize) {
         if self.spare.is_over(self.hot.len(), slots) {
             debug_assert!(self.hot.iter().skip(slots).all(|hot| !hot.live));
@@ -275,7 +275,7 @@ impl Narrow {
         }
     }
 
-    /// Takes a verdict and keeps lists and counts in step.
+    /// Sets a verdict and keeps lists and counts consistent.
     pub(super) fn settle(&mut self, slot: PairSlot, verdict: Verdict) {
         let hot = &mut self.hot[slot.index()];
         let before = std::mem::replace(&mut hot.verdict, verdict);
@@ -301,7 +301,7 @@ impl Narrow {
         }
         let walk = self.shelves.cursors.get(memo.report_cursor);
         if verdict == Verdict::Near && walk.is_some_and(|walk| walk.goal == Goal::Contacts) {
-            // Its contacts are those of a collision that is over.
+            // Its contacts belong to a collision that is over.
             self.shelves.give_cursor(&mut memo.report_cursor);
         }
         if verdict == Verdict::Apart {

@@ -1,19 +1,19 @@
 //! Narrow phase: a sound interval for every candidate pair, widened by motion, narrowed by work that can stop
 //! after any unit.
 //!
-//! In: the world, the pair set and its delta, a [`Meter`]. Out: for each pair a verdict, an
-//! interval, a witness and (when somebody listens) contacts; see [`Narrow::finding`].
+//! In: the world, the pair set and its delta, a [`Meter`]. Out: for each pair a verdict, an interval, a witness and
+//! (when somebody listens) contacts; see [`Narrow::finding`].
 //!
-//! How it goes, tick by tick:
+//! The stages of a tick:
 //! 1. `begin`: memories follow the pair set (`PairDelta`); a new pair starts from the bounds of its boxes.
-//! 2. `widen`: the pairs of bodies that moved are compared with their certificates. A certificate is an interval
-//!    with the bodies' motion accumulators at its test; while the motion since does not use it up, the pair costs one
-//!    comparison. Pairs of which nothing moved are not visited at all.
-//! 3. `spend`: pairs without a verdict first, oldest first; then bounds and contacts of those that are reported; then
-//!    the regions in which open pairs may touch.
+//! 2. `widen`: the pairs of bodies that moved are checked against their certificates. A certificate is an interval with
+//!    the bodies' motion accumulators at its test; until the motion since then uses it up, the pair costs one
+//!    comparison. Pairs of which neither body moved are not visited.
+//! 3. `spend`: pairs without a verdict first, oldest first; then bounds and contacts of reported pairs; then the
+//!    regions in which open pairs may touch.
 //!
-//! Refused: a verdict from an older pose without widening (unsound), a queue per pair for convex shapes (one query
-//! decides them), throwing interrupted work away (it is resumed at its first pose, and widened from there).
+//! Refused: a verdict from an older pose without widening (unsound); a queue per pair for convex shapes (one query
+//! decides them); discarding interrupted work (it is resumed at its first pose and widened from there).
 
 pub mod exact;
 pub mod mesh;
@@ -76,13 +76,13 @@ use sweep::{FIRST_LOOKS, Sweeps};
 /// What the narrow phase did in this tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// Pairs visited because a body of theirs moved.
+    /// Pairs visited because one of their bodies moved.
     pub visited: u64,
-    /// Places of pairs that were gone through for that.
+    /// Pair slots passed over to find them.
     pub walked: u64,
     /// Exact queries of convex shape pairs.
     pub queries: u64,
-    /// Slices of walks over meshes.
+    /// Slices of mesh walks.
     pub slices: u64,
     /// Manifolds computed.
     pub manifolds: u64,
@@ -91,70 +91,70 @@ pub struct Counters {
 /// The narrow phase's memory of all pairs, by `PairSlot`.
 #[derive(Debug, Default)]
 pub struct Narrow {
-    /// What the motion pass reads: 24 bytes a pair.
+    /// What the motion pass reads, 24 bytes per pair.
     hot: Vec<Hot>,
     /// Everything else about a pair.
     memos: Vec<Memo>,
-    /// `S + d` of each body, by `BodySlot`; infinite while the body's place is not known to the point: then no
-    /// certificate spares a look.
+    /// `S + d` of each body, by `BodySlot`; infinite while the body's place is not known exactly: then no certificate
+    /// saves a visit.
     spent_m: Vec<f64>,
-    /// When pairs of a body may have been missed, by `BodySlot`.
+    /// The ticks in which pairs of a body may have been missed, by `BodySlot`.
     unseen: Vec<Unseen>,
-    /// Bodies with a pair that did not fit into the pair set in the tick before.
+    /// Bodies with a pair that did not fit into the pair set in the last tick.
     short: Vec<BodySlot>,
     /// Pairs whose verdict is not `apart`.
     active: Vec<PairSlot>,
-    /// Pairs that have become active since this was last cleared; they may have stopped, or be others by now.
+    /// Pairs that became active since this was last cleared; by now they may be inactive, or the slot reused.
     entered: Vec<PairSlot>,
-    /// By `PairSlot`: what [`Narrow::finding`] or the contacts say may differ from what was last told.
+    /// By `PairSlot`: the finding or the contacts may differ from what was last published.
     stirred: Flags,
     /// Pairs that stopped being active in this tick and still exist.
     left: Vec<PairSlot>,
-    /// They stopped after their findings were taken: the next tick is to hear of them.
+    /// `left` was filled after the findings were published; the next tick must report it.
     left_is_news: bool,
-    /// Pairs that got their verdicts in the last [`Narrow::go_on`]; some may stand here twice.
+    /// Pairs that got their verdicts in the last [`Narrow::go_on`]; may hold duplicates.
     late: Vec<PairSlot>,
     /// Pairs that lack a verdict at this tick's poses and can get one by work.
     undecided: Vec<PairSlot>,
-    /// Pairs whose work came to its end without a verdict, for want of room: they start anew in the next tick.
+    /// Pairs whose work ended without a verdict because there was no room: they start again in the next tick.
     lost: Vec<PairSlot>,
     /// Active pairs whose bounds or contacts are older than their poses.
     refresh: Vec<PairSlot>,
-    /// What is carried of pairs of which one body has several shapes.
+    /// Fronts of pairs of which one body has several shapes.
     compounds: Pool<CompoundFront>,
     shelves: Shelves,
     search: Search,
     sweeps: Sweeps,
     refits: Refits,
     contact_sets: Pool<ContactSet>,
-    /// What the order of work asks of each pair, by `PairSlot`.
+    /// What the order of work depends on, by `PairSlot`.
     urgencies: Vec<Urgency>,
     spare: Spare,
-    /// Work with its ranks, while it is ordered.
+    /// Work with its ranks, while it is being ordered.
     keyed: Vec<(u64, PairSlot)>,
     rank_cost: RankCost,
-    /// Contacts of the query at hand.
+    /// Contacts of the current query.
     found: Vec<Contact>,
-    /// The contacts that a set had before, while ids are handed on.
+    /// The previous contacts of a set, while ids are passed on.
     before: Vec<Contact>,
     approx: Approx,
-    /// Regions that were split, or of pairs that were complete.
+    /// Regions of pairs that were split or complete.
     kept: Pool<Kept>,
     counts: [u64; Verdict::ALL.len()],
     counters: Counters,
     contacts_per_pair: usize,
     contacts_wanted: bool,
     bounds_wanted: bool,
-    /// There was no time for all bounds in the tick before.
+    /// In the last tick there was no time for all bounds.
     scarce: bool,
-    /// Pairs that lack what is worked on.
+    /// Pairs that lack the level being worked on.
     level: Vec<PairSlot>,
     tick: u64,
-    /// Of this tick, in [`Hot::visited`]; never 0.
+    /// This tick's stamp in [`Hot::visited`]; never 0.
     stamp: u32,
 }
 
-/// What the narrow phase is asked for in this tick.
+/// What is wanted of the narrow phase in this tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted {
     /// Contacts and closest points of reported pairs.
@@ -178,8 +178,8 @@ impl Narrow {
         }
     }
 
-    /// An empty memory in place of one that did not hold: pairs that begin in tick `tick` may have collided unseen
-    /// since `since`.
+    /// An empty memory in place of one that failed its validation: pairs that begin in tick `tick` may have collided
+    /// unseen since `since`.
     #[must_use]
     pub fn renewed(contacts_per_pair: usize, world: &World, since: u64, tick: u64) -> Self {
         let mut narrow = Self::new(contacts_per_pair);
@@ -201,12 +201,12 @@ impl Narrow {
         narrow
     }
 
-    /// How the fronts of mesh pairs go about their work from now on; [`Search::Carried`] unless said otherwise.
+    /// Sets how the fronts of mesh pairs search; the default is [`Search::Carried`].
     pub fn set_search(&mut self, search: Search) {
         self.search = search;
     }
 
-    /// Lets the memories follow the pair set: ended pairs are forgotten, begun ones start from their boxes.
+    /// Updates the memories from the pair set: ended pairs are forgotten, new ones start from their boxes.
     pub fn begin(&mut self, tick: u64, world: &World, pairs: &PairSet, delta: &PairDelta) {
         self.tick = tick;
         self.next_stamp();
@@ -227,10 +227,10 @@ impl Narrow {
         }
     }
 
-    /// Spends the meter: boxes of meshes that deform, what lies between the poses, verdicts, then what is listened to.
-    /// Returns whether everything asked for is done.
+    /// Spends the meter: refits of meshes that deform, sweeps, verdicts, then whatever has listeners. Returns whether
+    /// all wanted work is done.
     ///
-    /// * `world` - nothing of it is changed but boxes in trees.
+    /// * `world` - only boxes in its trees are changed.
     pub fn spend(&mut self, world: &mut World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
         self.shelves.store.touch_ahead(meter);
         self.spend_on_refits(world, wanted, meter);
@@ -252,14 +252,14 @@ impl Narrow {
         self.close_sweeps();
         meter.release(kept);
         self.spend_on_regions(world, wanted, meter);
-        // With what splitting did not take.
+        // Once more, with the units that splitting left over.
         done || (swept
             && self.spend_on_verdicts(world, wanted, meter)
             && self.spend_on_reports(world, wanted, meter))
     }
 
-    /// As [`Narrow::spend`], after the tick's findings were taken: what is found now is told in the next tick, and is
-    /// of this one's poses ([`Narrow::late`]).
+    /// As [`Narrow::spend`], after the tick's findings were published: what is found now holds at this tick's poses and
+    /// is published in the next tick ([`Narrow::late`]).
     pub fn go_on(&mut self, world: &mut World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
         if !std::mem::replace(&mut self.left_is_news, true) {
             self.left.clear();
@@ -270,27 +270,27 @@ impl Narrow {
         self.spend_on_verdicts(world, wanted, meter) && self.spend_on_reports(world, wanted, meter)
     }
 
-    /// How many pairs have this verdict (`Apart`: of those that were ever decided).
+    /// Number of pairs with this verdict (`Apart`: only those that were ever decided).
     #[must_use]
     pub fn count(&self, verdict: Verdict) -> u64 {
         self.counts[usize::from(verdict.code())]
     }
 
-    /// What this tick did.
+    /// Counters of this tick.
     #[must_use]
     pub fn counters(&self) -> Counters {
         self.counters
     }
 
-    /// From which tick on a pair of this body that begins now may have collided unseen; `None`: had it collided in the
-    /// tick before, its boxes would have said so.
+    /// The tick since which a pair of this body that begins now may have collided unseen; `None`: had it collided in
+    /// the last tick, its boxes would have overlapped then.
     #[must_use]
     pub fn unseen_since(&self, slot: BodySlot) -> Option<u64> {
         let unseen = self.unseen.get(slot.index())?;
         (unseen.last >= self.tick).then_some(unseen.first)
     }
 
-    /// Keeps the work that last tick left undone, and drops from the lists what is settled.
+    /// Keeps the work that the last tick left undone and drops settled pairs from the lists.
     fn carry_over(&mut self) {
         let (hot, memos) = (&self.hot, &mut self.memos);
         self.undecided.retain(|slot| {
@@ -298,7 +298,7 @@ impl Narrow {
             memo.queued &= hot.live && hot.verdict == Verdict::Possible;
             memo.queued
         });
-        // At rest nobody else would come to them. What they hold may be just what they lack.
+        // Queue them again here: at rest nothing else would. Free their memory: it may be the very room they lacked.
         for at in 0..self.lost.len() {
             let slot = self.lost[at];
             let hot = &self.hot[slot.index()];
@@ -318,8 +318,7 @@ impl Narrow {
         });
     }
 
-    /// Takes note of bodies that entered the broad phase or whose place is not known, and of how far the others have
-    /// gone.
+    /// Records which bodies entered the broad phase or have no known place, and how far the others have moved.
     fn note_bodies(&mut self, world: &World) {
         let len = world.slots_len();
         if self.spent_m.len() < len {
@@ -359,7 +358,7 @@ impl Narrow {
         }
     }
 
-    /// Takes note of bodies whose pairs do not all fit into the pair set: the next tick may find more of them.
+    /// Records the bodies whose pairs did not all fit into the pair set: the next tick may find more of them.
     fn note_missing(&mut self, pairs: &PairSet) {
         for at in 0..self.short.len() {
             let slot = self.short[at];
@@ -370,13 +369,13 @@ impl Narrow {
     }
 }
 
-/// Ticks in which pairs of a body may have been missed: it was not in, its place was not known, it was filtered
-/// otherwise, or the pair set was full.
+/// Ticks in which pairs of a body may have been missed: it was not in the broad phase, its place was not known, its
+/// filter was different, or the pair set was full.
 #[derive(Clone, Copy, Debug, Default)]
 struct Unseen {
-    /// The first of them; for a body that has just come, its first tick.
+    /// The first of these ticks; for a new body, its first tick.
     first: u64,
-    /// The last tick in which a pair may begin that was missed before; `u64::MAX`: it goes on.
+    /// The last tick in which a pair that was missed before may begin; `u64::MAX`: no end yet.
     last: u64,
 }
 

@@ -1,27 +1,27 @@
-//! The order of work: who has a turn first when the budget does not reach for all.
+//! The order of work: which pair has a turn first when the budget does not suffice for all.
 //!
-//! Urgency is a time of waiting times a weight: for its turn, or up to [`HEAD_START`] ticks for its verdict, whichever
-//! is more; last tick's contacts count as if they had waited so long. So nothing starves, neither behind contacts that
-//! are to be confirmed each tick nor behind pairs that no turn decides:
+//! Urgency is waiting time times weight. The waiting time is that for a turn, or that for a verdict up to
+//! [`HEAD_START`] ticks, whichever is more; last tick's contacts count as if they had waited that long. So nothing
+//! starves, neither behind contacts that are confirmed each tick nor behind pairs that no turn decides:
 //!
 //! **A pair that waits for a verdict has a turn after at most `w max(H + 2, R + 1) + R` ticks**, with
 //! - `H` = [`HEAD_START`], 16;
-//! - `R`: ticks that it takes to give each pair a turn that waits for one, `N / K` rounded up, of `N` pairs that wait
-//!   at the same time, and `K` turns a tick: one for each unit of the budget where all bodies are single convex shapes;
-//!   else one for each 4,096 (more than the longest turn of a mesh pair), and never less than one. Of the units, what
-//!   is kept back for others does not count: an eighth while `regions` are read, half while meshes deform, and half of
-//!   the rest while bodies are swept;
+//! - `R`: ticks needed to give each waiting pair one turn, `N / K` rounded up, with `N` pairs that wait at the same
+//!   time and `K` turns a tick: one for each unit of the budget if all bodies are single convex shapes; else one for
+//!   each 4,096 units (more than the longest turn of a mesh pair), and never less than one. Units that are kept back
+//!   for other work do not count: an eighth while `regions` are read, half while meshes deform, and half of the rest
+//!   while bodies are swept;
 //! - `w`: the greatest weight of a pair over the least: the ratio of their priorities, times [`CLOSING_WEIGHT`], 4,
 //!   times the weight of the scene's viewpoint.
 //!
-//! For who goes before a pair that has waited `T >= w max(H + 2, R + 1)` ticks has waited itself for at least
-//! `T / w - 1 >= R`: its weight is at most `w` times as much, and no head start makes up for it. So within the next `R`
-//! ticks nobody goes before it twice, and nobody at all who was not waiting at their begin: `N` turns are enough.
-//! (`tests/law_engine/schedule.rs` holds runs against it, and `tests` runs of meshes.) A turn decides a convex pair. A
-//! mesh pair may need several, and motion may undo them faster than a budget renews them; its turns grow while it waits
-//! (`carry`).
+//! Proof: a pair served before one that has waited `T >= w max(H + 2, R + 1)` ticks has itself waited at least
+//! `T / w - 1 >= R` ticks: its weight is at most `w` times as much, and no head start makes up for the difference. So
+//! within the next `R` ticks no pair is served twice before it, and no pair that was not waiting when they began: `N`
+//! turns are enough. (`tests/law_engine/schedule.rs` checks runs against it, `tests` runs of meshes.) One turn decides
+//! a convex pair. A mesh pair may need several, and motion may undo them faster than a budget renews them; its turns
+//! grow while it waits (`carry`).
 //!
-//! Reports (bounds, contacts) have what verdicts leave, in the same order.
+//! Reports (bounds, contacts) get what verdicts leave, in the same order.
 
 use crate::ids::PairSlot;
 use crate::math::f32_down;
@@ -31,29 +31,29 @@ use crate::world::{Body, Gaze, World};
 use super::Narrow;
 use super::memo::Memo;
 
-/// How work is ordered. What is finished in the end does not depend on it; what is finished when time runs out does.
+/// How work is ordered. The final results do not depend on it; what is finished when time runs out does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// As found: for a budget without limit, where order means nothing.
+    /// As found: for a budget without limit, where order does not matter.
     AsFound,
-    /// Last tick's contacts, then by age, weighted by the bodies' priority and by how fast they come nearer: for a
-    /// budget in time.
+    /// Last tick's contacts, then by age, weighted by the bodies' priority and by how fast they approach: for a budget
+    /// in time.
     Aged,
-    /// As `Aged`, with ties broken by body ids: for a budget in units, so that a run replays bit for bit whatever the
-    /// slots are.
+    /// As `Aged`, with ties broken by body ids: for a budget in units, so that a run replays bit for bit regardless of
+    /// the slots.
     Counted,
 }
 
-/// Pairs put in order at once. Work is put in order as it is reached: where time ends after a few queries, most of the
-/// list never needs an order, and no sort takes longer than a query or two.
+/// Number of pairs sorted at once. Work is sorted as it is reached: where time ends after a few queries, most of the
+/// list never needs sorting, and no sort takes longer than a query or two.
 const BATCH: usize = 128;
 
-/// Parts that a list can be in while the front of it is put in order: each is at least a quarter of the one around it.
+/// Most partitions that a list can have while its front is sorted: each is at least a quarter of the enclosing one.
 const PARTS_MAX: usize = 64;
 
-/// What it takes to rank a pair and to part the list a first time, nanoseconds: learned from list to list, and never
-/// believed to be less than it is on a good day (measured: 4 to 10 without a viewpoint; with one two bodies are looked
-/// up and an angle is taken), nor more than so many times as much: that was something else.
+/// Time to rank a pair and to partition the list a first time, nanoseconds: learned from list to list, and clamped
+/// between `RANK_NS` (measured on a good day: 4 to 10 without a viewpoint; with one, two bodies are looked up and an
+/// angle is computed) and a multiple of it: anything above had another cause.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RankCost {
     /// Without a viewpoint, and with one.
@@ -62,7 +62,7 @@ pub(super) struct RankCost {
 
 const RANK_NS: [u64; 2] = [16, 160];
 const RANK_TIMES_MAX: u64 = 8;
-/// Lists of fewer pairs teach nothing: what is read once counts for more than the pairs.
+/// Shorter lists teach nothing: their fixed reads outweigh the pairs.
 const RANK_LEARN_MIN: usize = 256;
 
 impl Default for RankCost {
@@ -72,12 +72,12 @@ impl Default for RankCost {
 }
 
 impl RankCost {
-    /// Of a list of so many pairs, nanoseconds.
+    /// Expected time for a list of `pairs` pairs, nanoseconds.
     pub(super) fn of(&self, pairs: usize, gaze: bool) -> u64 {
         pairs as u64 * self.ns[usize::from(gaze)]
     }
 
-    /// No list was ranked, for it might have taken too long: what was learned once does not hold for ever.
+    /// No list was ranked because it might have taken too long: lower the estimate, so that it does not hold for ever.
     pub(super) fn forget(&mut self, gaze: bool) {
         self.set(0, gaze);
     }
@@ -89,7 +89,7 @@ impl RankCost {
         self.set(took_ns / pairs as u64, gaze);
     }
 
-    /// Upwards at once, downwards a little.
+    /// Raises at once, lowers slowly.
     fn set(&mut self, each_ns: u64, gaze: bool) {
         let at = usize::from(gaze);
         let (least, now) = (RANK_NS[at], self.ns[at]);
@@ -98,22 +98,22 @@ impl RankCost {
     }
 }
 
-/// The fastest approach counts as this many times the age: what comes nearer by much more than its size since it was
-/// last asked is up to four times as urgent as what does not.
+/// The fastest approach multiplies the age by this: a pair that came nearer by much more than its size since its last
+/// query is up to four times as urgent as one that did not.
 const CLOSING_WEIGHT: f64 = 4.0;
 
-/// Ticks of waiting for a verdict that count, and what last tick's contacts are given on top of their own: a contact is
-/// mostly confirmed by one test. Without an end a pair that no turn decides would be ahead of all others for ever.
+/// Ticks of waiting for a verdict that count, and the bonus of last tick's contacts: a contact is mostly confirmed by
+/// one test. Without a cap, a pair that no turn decides would be ahead of all others for ever.
 const HEAD_START: u32 = 16;
 
-/// What the order of work asks of a pair, side by side for all pairs: the records it comes from are far apart.
+/// What the order of work depends on, in one array for all pairs: the records it comes from are far apart.
 ///
-/// Ticks are cut to 32 bits: only differences are asked for.
+/// Ticks are cut to 32 bits: only differences are used.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Urgency {
     /// First tick without a verdict.
     since: u32,
-    /// Tick in which it had its last turn, or was put on a list of work.
+    /// Tick of its last turn, or in which it was put on a list of work.
     turn: u32,
     /// Priority times the factor for its approach, positive.
     weight: f32,
@@ -146,10 +146,10 @@ fn cut(tick: u64) -> u32 {
 }
 
 impl Urgency {
-    /// Takes what a look at the pair has found.
+    /// Updates the weight from a visit to the pair.
     ///
     /// * `priority` - the pair's: the greater of its bodies'.
-    /// * `closing_m` - how far the two came nearer since the test, where they are nearest.
+    /// * `closing_m` - how far the two approached each other since the test, along the witness (`memo::closing`).
     /// * `size_m` - the radius of the smaller.
     pub(super) fn weigh(&mut self, priority: f64, closing_m: f64, size_m: f64) {
         let nearer = closing_m.max(0.0);
@@ -161,22 +161,22 @@ impl Urgency {
         self.weight = f32_down(priority * (1.0 + (CLOSING_WEIGHT - 1.0) * share));
     }
 
-    /// Takes the pair's verdict.
+    /// Takes over the pair's verdict.
     pub(super) fn settle(&mut self, memo: &Memo) {
         self.since = cut(memo.undecided_since);
         self.undecided = memo.undecided_since != 0;
         self.touched = memo.witness.is_some_and(|w| w.best_m <= 0.0);
     }
 
-    /// The pair has a turn in this tick, or is put on a list: from here on it waits.
+    /// The pair has a turn in this tick, or is put on a list: its waiting time starts here.
     pub(super) fn note_turn(&mut self, tick: u64) {
         self.turn = cut(tick);
     }
 
-    /// Place in the order of work, the least first: waiting times weight, the greatest first (positive floats order
+    /// Sort key in the order of work, least first: waiting time times weight, greatest first (positive floats order
     /// like their bits).
     ///
-    /// * `seen` - weight of the place where it is (`Gaze::weight`); 1 without a viewpoint.
+    /// * `seen` - weight of the pair's place (`Gaze::weight`); 1 without a viewpoint.
     fn rank(self, tick: u64, seen: f64) -> u64 {
         let since = |then: u32| cut(tick).wrapping_sub(then);
         let age = if self.undecided { since(self.since) } else { 0 };
@@ -188,19 +188,19 @@ impl Urgency {
     }
 }
 
-/// How far a list of work has been put in order: an incremental quicksort, whose parts wait for their turn.
+/// How far a list of work is sorted: an incremental quicksort, whose partitions wait for their turn.
 #[derive(Debug)]
 pub(super) struct Line {
     order: Order,
-    /// Up to here it is in order.
+    /// Sorted up to here.
     ready: usize,
-    /// Ends of the parts that follow, the nearest last: what is in a part comes before all that is behind its end.
+    /// Ends of the partitions that follow, the nearest last: each item in a partition comes before all behind its end.
     ends: [usize; PARTS_MAX],
     parts: usize,
 }
 
 impl Line {
-    /// A list of so many, of which nothing is in order yet.
+    /// A list of `len` items, none of them sorted yet.
     pub(super) fn new(order: Order, len: usize) -> Self {
         let ready = if order == Order::AsFound { len } else { 0 };
         let mut ends = [0; PARTS_MAX];
@@ -213,12 +213,12 @@ impl Line {
         }
     }
 
-    /// Nothing more is to be put in order.
+    /// Nothing more is to be sorted.
     pub(super) fn finish(&mut self, len: usize) {
         self.ready = len;
     }
 
-    /// Puts the next items in order, at most [`BATCH`], by parting the list until a part is that small.
+    /// Sorts the next items, at most [`BATCH`], by partitioning the list until a partition is that small.
     fn advance<T, K: Ord>(&mut self, items: &mut [T], key: impl Fn(&T) -> K) {
         while self.parts > 0 {
             let end = self.ends[self.parts - 1];
@@ -237,7 +237,7 @@ impl Line {
 }
 
 impl Narrow {
-    /// Begins a list of work: gathers the ranks, and puts the first batch in order.
+    /// Begins a list of work: computes the ranks and sorts the first batch.
     pub(super) fn line_up(
         &mut self,
         work: &[PairSlot],
@@ -248,7 +248,7 @@ impl Narrow {
     ) -> Line {
         self.keyed.clear();
         if order != Order::AsFound {
-            // Room for every pair at once: how many are undecided creeps up for long where work is cut off.
+            // Room for every pair at once: the number of undecided pairs creeps up for long where work is cut off.
             if self.keyed.capacity() < work.len() {
                 self.keyed.reserve(self.hot.len());
             }
@@ -271,8 +271,8 @@ impl Narrow {
         line
     }
 
-    /// Puts the next batch in order when the work has come as far as the last; returns what it took since the clock was
-    /// last read.
+    /// Sorts the next batch once the work has used up the last; returns the time that took since the clock was last
+    /// read.
     pub(super) fn order_next(
         &mut self,
         line: &mut Line,
@@ -297,7 +297,7 @@ impl Narrow {
     }
 }
 
-/// How much a pair counts by where it is: at its smaller body.
+/// Weight of a pair by its place: that of its smaller body.
 fn seen(gaze: &Gaze, (a, b): (&Body, &Body)) -> f64 {
     let smaller = if a.radius < b.radius { a } else { b };
     gaze.weight(&(smaller.pose * smaller.centre), smaller.radius)

@@ -1,5 +1,5 @@
-//! Passes over many pairs: turns in order while the meter is open, and pairs asked for ahead, since what a turn reads
-//! lies in several places, all far apart.
+//! Passes over many pairs: turns in order while the meter is open, with pairs prefetched, since the data of a turn lies
+//! in several places, all far apart.
 
 use crate::ids::PairSlot;
 use crate::simd::boxes::prefetch;
@@ -18,8 +18,8 @@ pub(super) struct Pass<'a, Idle> {
 }
 
 impl Narrow {
-    /// Gives each pair a turn, in order, and those that need more further turns, while the meter is open; returns the
-    /// pairs that are not done.
+    /// Gives each pair a turn, in order, and further turns to those that need more, while the meter is open; returns
+    /// the pairs that are not done.
     pub(super) fn spend_on<'m>(
         &mut self,
         mut work: Vec<PairSlot>,
@@ -32,8 +32,8 @@ impl Narrow {
             return work;
         }
         let gaze = world.gaze();
-        // To rank them all takes a while too. Where nothing could be done in what is left then, they come as they
-        // stand: by the last ranking, then the new ones.
+        // Ranking takes time too. If nothing could be done in what is left then, the pairs keep their present order: by
+        // the last ranking, then the new ones.
         let ranked = meter.has_ns(self.rank_cost.of(work.len(), gaze.is_some()));
         let order = if ranked {
             order
@@ -61,7 +61,7 @@ impl Narrow {
                 }
                 at += 1;
             }
-            // Who had no turn keeps its place behind those who had.
+            // Pairs that had no turn keep their order, behind those that had one.
             let behind = work.len() - at;
             for (to, &(_, slot)) in work[at..].iter_mut().zip(self.keyed.iter().skip(at)) {
                 *to = slot;
@@ -69,7 +69,7 @@ impl Narrow {
             work.copy_within(at.., left);
             work.truncate(left + behind);
             if !ranked {
-                // Else whom no turn decides would have them all.
+                // Otherwise pairs that no turn decides would take all turns.
                 work.rotate_left(left);
             }
             // Further rounds keep the order of the first.
@@ -79,10 +79,10 @@ impl Narrow {
         work
     }
 
-    /// At step `at` of a pass: asks for the pairs, bodies and shapes of the steps to come.
+    /// At step `at` of a pass: prefetches the pairs, bodies and shapes of the coming steps.
     ///
     /// * `next` - the pair of a step.
-    /// * `wants` - whether its bodies will be looked at.
+    /// * `wants` - whether its bodies will be read.
     #[inline]
     fn ask_along(
         &self,
@@ -106,7 +106,7 @@ impl Narrow {
         });
     }
 
-    /// At step `at` of visits to some pairs: asks for what those to come are compared by, and for the rest of those
+    /// At step `at` of visits to some pairs: prefetches the certificates of the coming ones, and the rest of those
     /// whose certificates are spent.
     #[inline]
     pub(super) fn ask_ahead_of_visits(&self, slots: &[PairSlot], at: usize, world: &World) {
@@ -118,13 +118,13 @@ impl Narrow {
         }
     }
 
-    /// At place `at` of the straight walk over all pairs: asks for those to come whose certificates are spent.
+    /// At place `at` of the straight walk over all pairs: prefetches the coming ones whose certificates are spent.
     #[inline]
     pub(super) fn ask_ahead_of_walk(&self, at: usize, world: &World) {
         self.ask_ahead_of_look(at + AHEAD, world);
     }
 
-    /// Asks for what a look at the pair in a slot reads, if its certificate is spent.
+    /// Prefetches what `look` reads of the pair in a slot, if its certificate is spent.
     #[inline]
     fn ask_ahead_of_look(&self, slot: usize, world: &World) {
         let Some(hot) = self.hot.get(slot).filter(|hot| hot.live) else {

@@ -1,9 +1,9 @@
-//! Turns of pairs of a mesh and a half-space: walks that can stop, each at the pose that it was begun at.
+//! Turns of pairs of a mesh and a half-space: walks that can stop, each at the pose it began at.
 //!
-//! In: a pair, what it is asked for. Out: a certificate of the walk's pose, contacts of it. A pair has two walks: one
-//! for its verdict, which says nothing unless it is of a pose near this one, and one for whoever listens, which may
-//! take several ticks. Refused: one walk for both, where a verdict waits until the contacts of a pose of long ago are
-//! found (or contacts are never found, where it throws them away each time).
+//! In: a pair and its goal. Out: a certificate at the walk's pose, its contacts. A pair has two walks: one for its
+//! verdict, which proves nothing unless its pose is near the present one, and one for listeners, which may take several
+//! ticks. Refused: one walk for both: a verdict would wait until the contacts at an old pose are found (or contacts
+//! would never be found, if the verdict discards them each time).
 
 use crate::ids::PairSlot;
 use crate::math::{Interval, relative};
@@ -21,7 +21,7 @@ use super::spend::Answer;
 use super::{NONE, Narrow};
 
 impl Narrow {
-    /// One turn of a mesh and a half-space: resumed where it stopped, or started at this tick's poses.
+    /// One turn of a mesh and a half-space: resumes the walk, or starts one at this tick's poses.
     pub(super) fn turn_cursor(
         &mut self,
         slot: PairSlot,
@@ -45,10 +45,10 @@ impl Narrow {
         let now = (relative(&a.pose, &b.pose), Bent::of_bodies(a, b));
         let outdated = if for_verdict {
             let here = (cursor.rel, cursor.bent) == now;
-            // What is asked for less must not wait for more, of another pose; nor for what is known better by now.
+            // No wait for a larger goal at another pose, nor for a cursor older than the last test.
             cursor.goal < goal || cursor.goal > goal && !here || cursor.tick < memo.tested
         } else {
-            // Contacts of a collision that has ended since are those of none.
+            // These contacts belong to a collision that has ended since.
             cursor.goal == Goal::Verdict || cursor.tick < memo.parted
         };
         if fresh || outdated {
@@ -84,7 +84,7 @@ impl Narrow {
         let contacts_owed =
             self.contacts_wanted && self.hot[slot.index()].verdict == Verdict::Colliding;
         if turn == Turn::Finished && overtaken && cursor.goal == Goal::Gap && contacts_owed {
-            // Where a tick does not reach for a bound, contacts have their turn after each: they tell a bound, too.
+            // If a bound does not fit into a tick, alternate with contacts: their walk gives a bound, too.
             let credit_m = a.motion.credit_m() + b.motion.credit_m();
             cursor.start((0, 0), now, credit_m, self.tick, Goal::Contacts);
         } else if turn == Turn::Finished {
@@ -94,7 +94,7 @@ impl Narrow {
                 &mut memo.report_cursor
             });
             if !for_verdict && !overtaken {
-                // It has told all that one for the verdict could have.
+                // It has found all that the walk for the verdict could.
                 self.shelves.give_cursor(&mut memo.cursor);
             }
         }
@@ -104,7 +104,7 @@ impl Narrow {
         if contacts {
             self.keep_contacts(slot, a.radius.min(b.radius), found_at);
         }
-        // Where it was overtaken, another one starts at this tick's poses.
+        // If motion overtook it, another one starts at this tick's poses.
         if overtaken { Turn::Open } else { turn }
     }
 }
@@ -112,7 +112,7 @@ impl Narrow {
 impl Memo {
     /// Takes over the certificate of a walk, finished or not, and what it proves of the gap at its pose.
     ///
-    /// * `high` - the upper end that it proves.
+    /// * `high` - the upper end of the gap that it proves.
     fn take_walk(
         &mut self,
         cursor: &Cursor,
@@ -120,7 +120,7 @@ impl Memo {
         high: f64,
         (a, b): (&Body, &Body),
     ) -> Answer {
-        // What was known before holds at this tick's poses; carried back to the cursor's, it loses the motion between.
+        // The earlier bound holds at this tick's poses; at the cursor's pose it is less by the motion between.
         let then = (&cursor.rel, cursor.bent);
         let since = changed_since(a, b, then, &relative(&a.pose, &b.pose));
         let known_low = (self.here().min - since).next_down();
@@ -142,10 +142,10 @@ impl Memo {
         }
     }
 
-    /// Narrows the certificate by what a finished walk at an older pose proves: at the certificate's own, by the motion
-    /// between the two.
+    /// Narrows the certificate by what a finished walk at an older pose proves, carried to the certificate's pose: less
+    /// the motion between the two.
     fn meet_older(&mut self, cursor: &Cursor, (a, b): (&Body, &Body)) {
-        // From the vertices of then to those of now, to the other pose with these, and back to those of the test.
+        // From the vertices then to the present ones, with these to the other pose, and back to the test's vertices.
         let bent_m = Bent::of_bodies(a, b).since_m(&self.bent);
         let moved_m = changed_since(a, b, (&cursor.rel, cursor.bent), &self.rel);
         let by_m = (moved_m + bent_m).next_up();

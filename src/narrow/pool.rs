@@ -1,6 +1,6 @@
-//! Objects that are handed out and given back: their memory serves the next owner.
+//! Reusable objects: the memory of a released one serves the next owner.
 
-/// Reusable objects by index: what was given back is handed out again with its memory.
+/// Reusable objects by index: a released one is handed out again with its memory.
 #[derive(Debug, Default)]
 pub(super) struct Pool<T> {
     items: Vec<T>,
@@ -11,10 +11,10 @@ pub(super) struct Pool<T> {
 pub(super) const NONE: u32 = u32::MAX;
 
 impl<T> Pool<T> {
-    /// An object, used before or made now.
+    /// An object, reused or new.
     ///
-    /// When there is none left, half as many more are made at once: how many are out at the same time creeps up for
-    /// long where work is cut off, and each new peak would allocate.
+    /// If none is free, half as many more are made at once: the number in use creeps up for long where work is cut off,
+    /// and each new peak would allocate.
     pub(super) fn take(&mut self, make: impl Fn() -> T) -> u32 {
         if self.free.is_empty() {
             let more = self.items.len() / 2 + 1;
@@ -23,13 +23,13 @@ impl<T> Pool<T> {
                 self.items.push(make());
                 self.free.push(at);
             }
-            // Room to give every object back without growing later.
+            // Capacity to take every object back without growing later.
             self.free.reserve(self.items.len() - self.free.len());
         }
         self.free.pop().unwrap_or(NONE)
     }
 
-    /// The object at a place, or one that is taken where there is none yet.
+    /// The object at an index, or a newly taken one if there is none yet.
     pub(super) fn get_or_take(&mut self, at: &mut u32) -> Option<&mut T>
     where
         T: Default,
@@ -40,7 +40,7 @@ impl<T> Pool<T> {
         self.get_mut(*at)
     }
 
-    /// Gives an object back.
+    /// Releases an object.
     pub(super) fn give(&mut self, at: &mut u32) {
         if *at != NONE {
             self.free.push(*at);
@@ -48,17 +48,17 @@ impl<T> Pool<T> {
         }
     }
 
-    /// All objects, those that were given back too.
+    /// All objects, including released ones.
     pub(super) fn all(&self) -> &[T] {
         &self.items
     }
 
-    /// Structure check: each object is free, or of one owner.
+    /// Structure check: each object is free or has exactly one owner.
     ///
-    /// * `held` - the places of all who may hold one.
+    /// * `held` - the indices that the owners hold.
     ///
     /// # Errors
-    /// The first object of which this does not hold.
+    /// The first object that violates this.
     pub(super) fn validate(
         &self,
         what: &str,

@@ -14,7 +14,7 @@ use super::memo::Witness;
 use super::mesh::{LeafContact, retest_witness};
 use super::widen::widened;
 
-/// Whether the pair of shapes is answered by one exact query.
+/// Whether one exact query decides the pair of shapes.
 pub(super) fn is_simple(a: &Shape, b: &Shape) -> bool {
     !matches!(a.geometry, Geometry::Mesh(_)) && !matches!(b.geometry, Geometry::Mesh(_))
 }
@@ -31,7 +31,7 @@ pub(super) fn shape_gap(a: &Shape, b: &Shape, pos12: &Pose, warm: &mut Warm) -> 
 
 /// As [`shape_gap`].
 ///
-/// * `shell` - see [`convex_gap_along`]; of a pair that is followed.
+/// * `shell` - see [`convex_gap_along`]; for a pair that is queried from tick to tick.
 pub(super) fn shape_gap_along(
     a: &Shape,
     b: &Shape,
@@ -54,7 +54,7 @@ pub(super) fn shape_gap_along(
     }
 }
 
-/// The answer of a shape pair as the witness of the body pair.
+/// The result for a shape pair as a witness of the body pair.
 pub(super) fn witness_of(
     a: &PlacedShape,
     b: &PlacedShape,
@@ -71,10 +71,9 @@ pub(super) fn witness_of(
     }
 }
 
-/// Appends the contact points of a colliding shape pair to `found`: all of them, of which the pair's contact set keeps
-/// four.
+/// Appends the contact points of a colliding shape pair to `found`: all of them; the pair's contact set keeps four.
 ///
-/// * `gap` - of the answer, as it holds for the bodies: see [`sound`].
+/// * `gap` - the query's interval as it holds for the bodies: see [`sound`].
 pub(super) fn add_manifold(
     (a, b): (&Body, &Body),
     (place_a, place_b): (u32, u32),
@@ -124,8 +123,8 @@ pub(super) fn add_manifold(
     }
 }
 
-/// Where two leaves of meshes touch, as a contact of the bodies. `patch`: a number, equal for points that came in as
-/// one patch.
+/// The place where two leaves of meshes touch, as a contact of the bodies. `patch`: equal for points found as one
+/// patch.
 pub(super) fn leaf_contact(
     (one, other): (&PlacedShape, &PlacedShape),
     places: (u32, u32),
@@ -150,7 +149,7 @@ pub(super) fn leaf_contact(
     }
 }
 
-/// One exact query of what touched last: two shapes, or two of their triangles.
+/// One exact query of the pair that touched last: two shapes, or two of their triangles.
 pub(super) fn retest(a: &Shape, b: &Shape, pos12: &Pose, (ta, tb): (u32, u32)) -> Option<Closest> {
     if is_simple(a, b) {
         shape_gap(a, b, pos12, &mut Warm::default())
@@ -169,13 +168,13 @@ pub(super) fn sphere_bound(a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) ->
         a.pose * a.shape.centre,
         bodies12 * (b.pose * b.shape.centre),
     );
-    // The centres are sums of numbers that may be far larger than they are.
+    // The centres are sums of numbers that may be far larger than the centres themselves.
     let magnitude = bodies12.translation.vector.amax() + a.reach_m() + b.reach_m();
     (cb - ca).norm() - ra - rb - 32.0 * f64::EPSILON * magnitude
 }
 
-/// The certificate of a shape pair's answer for the bodies: its ends in order, and wider by what composing the poses
-/// may have lost. An overlap that is less than that is a touch.
+/// The certificate of a shape pair's result for the bodies: its ends in order, widened by what composing the poses may
+/// have lost. A smaller overlap counts as touching.
 pub(super) fn sound(gap: Interval, a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) -> Interval {
     let ordered = Interval {
         min: gap.min.min(gap.max),
@@ -184,8 +183,8 @@ pub(super) fn sound(gap: Interval, a: &PlacedShape, b: &PlacedShape, bodies12: &
     widened(ordered, lost_m(a, b, bodies12))
 }
 
-/// How far composing the poses may have put the one shape from its place seen from the other, metres: a shape a
-/// kilometre from its body's origin has its place rounded there, which a query of the two shapes cannot know.
+/// How far composing the poses may have displaced one shape seen from the other, metres: a shape a kilometre from its
+/// body's origin has its place rounded there, which a query of the two shapes cannot know.
 pub(super) fn lost_m(a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) -> f64 {
     let off = |pose: &Pose| *pose != Pose::identity();
     if !(off(&a.pose) || off(&b.pose)) {
@@ -204,7 +203,7 @@ mod tests {
     use crate::math::pose_from;
     use crate::shape::Convex;
 
-    /// Two balls that overlap by 0.5 nm; the one's centre is where two numbers a million times larger cancel.
+    /// Two balls that overlap by 0.5 nm; one centre is the sum of two numbers a million times larger that cancel.
     #[test]
     fn bug_balls_are_not_farther_apart_than_rounding_lets_their_centres_be_known() {
         let ball = |at: [f64; 3]| PlacedShape {
@@ -225,7 +224,7 @@ mod tests {
         let bodies12 = pose_from(away, turn).unwrap();
         let bound = sphere_bound(&ball([0.0; 3]), &ball([1e6, 0.0, 0.0]), &bodies12);
         assert!(bound <= -5.2e-10, "{bound}");
-        // And they say something all the same.
+        // The bound is useful all the same.
         let near = sphere_bound(&ball([0.0; 3]), &ball([3.0, 0.0, 0.0]), &Pose::identity());
         assert!((near - 2.0).abs() < 1e-12, "{near}");
     }

@@ -1,15 +1,15 @@
-//! Refits of meshes that deform: which body's boxes come first, and how much of the budget they take.
+//! Refits of meshes that deform: whose boxes come first, and how much of the budget they take.
 //!
-//! In: the pairs that wait for work, a [`Meter`]. Out: boxes that hold the newest vertices, or a part of them.
+//! In: the pairs that wait for work, a [`Meter`]. Out: boxes that hold the newest vertices, at least in part.
 //!
-//! A body is refitted when a pair of it waits, before that pair has its turn: with boxes that are widened by what has
-//! moved a test tells three times less already where that is 1.3 % of the body's size. Refits take at most half of what
-//! the budget leaves until pairs have had their turn; else a budget that does not reach for the refits would never
-//! decide anything. What is not done goes on in the next tick, also when new vertices have come: a round is finished
-//! before another begins, so boxes are never older than two rounds.
+//! A body is refitted when one of its pairs waits, before that pair's turn: boxes widened by the deformation already
+//! decide three times fewer tests when it is 1.3 % of the body's size. Refits take at most half of what the budget
+//! leaves until pairs have had their turn; otherwise a budget too small for the refits would never decide anything. An
+//! unfinished refit continues in the next tick, even if new vertices have come: a round is finished before the next
+//! begins, so boxes are never older than two rounds.
 //!
-//! Refused: each tick from the start (with a third of what a refit needs its upper boxes would never be done); refits
-//! of bodies of which no pair waits.
+//! Refused: starting over in each tick (with a third of what a refit needs, its upper boxes would never be done);
+//! refits of bodies for which no pair waits.
 
 use std::cmp::Reverse;
 
@@ -18,23 +18,22 @@ use crate::ids::{BodyId, BodySlot, PairSlot};
 use crate::time::{Meter, Share};
 use crate::world::World;
 
-/// Packs of eight boxes between two looks at the meter: a quarter of a microsecond.
+/// Packs of eight boxes between two checks of the meter: a quarter of a microsecond.
 const PACKS_PER_SLICE: usize = 8;
-/// What a pack costs, in tests of a box against a pack: when the clock is to be read.
+/// Cost of a pack, in tests of a box against a pack: decides when the clock is read.
 const PACK_COST: u64 = 2;
 
-/// Bodies to be refitted. Empty, and without memory, where no body deforms.
+/// Bodies to be refitted. Empty, and without memory, if no body deforms.
 #[derive(Debug, Default)]
 pub(super) struct Refits {
-    /// How long pairs of each body have waited, by `BodySlot`, ticks.
+    /// Total waiting time of each body's pairs, by `BodySlot`, ticks.
     waits: Vec<u64>,
-    /// In their order.
+    /// Sorted by it.
     due: Vec<(Reverse<u64>, BodyId, BodySlot)>,
 }
 
 impl Narrow {
-    /// Refits the bodies whose pairs wait, those first whose pairs wait longest in all; for at most half of what the
-    /// meter has.
+    /// Refits the bodies whose pairs wait, longest total wait first, with at most half of what the meter has.
     pub(super) fn spend_on_refits(
         &mut self,
         world: &mut World,
@@ -50,7 +49,7 @@ impl Narrow {
         self.refit_due(world, meter, Some(half));
     }
 
-    /// Goes on with them while the meter is open.
+    /// Continues the refits while the meter is open.
     pub(super) fn go_on_with_refits(&mut self, world: &mut World, meter: &mut Meter<'_>) {
         if !self.refits.due.is_empty() {
             self.refit_due(world, meter, None);
@@ -75,7 +74,7 @@ impl Narrow {
         }
     }
 
-    /// Lists the bodies whose boxes are behind and of which a pair waits.
+    /// Lists the bodies whose boxes are out of date and for which a pair waits.
     fn find_due(&mut self, world: &World, wanted: Wanted) {
         let Self {
             refits,

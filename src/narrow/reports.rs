@@ -1,9 +1,9 @@
-//! What is owed to whoever listens, once every pair has its verdict: bounds first, then contacts.
+//! What listeners get once every pair has its verdict: bounds first, then contacts.
 //!
-//! What is left out when the time is up, first of all: manifolds and contact sets, then bounds, then verdicts; what
-//! boxes and motion say is there in any case. So contacts have what bounds leave. Two convex bodies that collide get
-//! their bound along with their contacts, for one query says both, unless there was no time for all bounds in the tick
-//! before: then those of all pairs come before contacts of any.
+//! When time runs out, manifolds and contact sets are left out first, then bounds, then verdicts; what boxes and motion
+//! prove is always available. So contacts get what bounds leave. For two convex bodies that collide, one query gives
+//! both, so their bound comes along with their contacts, unless the last tick had no time for all bounds: then the
+//! bounds of all pairs come before contacts of any.
 
 use crate::ids::PairSlot;
 use crate::time::Meter;
@@ -15,7 +15,7 @@ use super::pass::Pass;
 use super::{Narrow, Wanted};
 
 impl Narrow {
-    /// Refreshes bounds and contacts of reported pairs; whether all are done.
+    /// Refreshes bounds and contacts of reported pairs. Returns whether all are done.
     pub(super) fn spend_on_reports(
         &mut self,
         world: &World,
@@ -43,7 +43,7 @@ impl Narrow {
         self.refresh.is_empty()
     }
 
-    /// Turns of the pairs on the list that lack this much.
+    /// Turns of the listed pairs that lack this level.
     fn spend_on_level(
         &mut self,
         world: &World,
@@ -68,7 +68,7 @@ impl Narrow {
         });
     }
 
-    /// When somebody begins to listen, pairs at rest owe them what was left out before.
+    /// When somebody begins to listen, pairs at rest lack what was left out before.
     fn follow_demand(&mut self, wanted: Wanted) {
         let more =
             (wanted.contacts && !self.contacts_wanted) || (wanted.bounds && !self.bounds_wanted);
@@ -87,7 +87,7 @@ impl Narrow {
         }
     }
 
-    /// Takes note of whether there was time for the bounds that somebody listens to.
+    /// Records whether there was time for all bounds that have listeners.
     pub(super) fn note_scarcity(&mut self, wanted: Wanted) {
         let lacks = |&slot: &PairSlot| self.lacks_bound(slot);
         self.scarce = wanted.bounds && self.refresh.iter().any(lacks);
@@ -99,7 +99,7 @@ impl Narrow {
         matches!(verdict, Verdict::Near | Verdict::Colliding) && !self.is_tight(slot)
     }
 
-    /// Whether the query for a pair's contacts says its bound, and is no dearer: two convex bodies that collide.
+    /// Whether the query for a pair's contacts also gives its bound at no extra cost: two convex bodies that collide.
     fn says_both(&self, slot: PairSlot) -> bool {
         let hot = &self.hot[slot.index()];
         hot.verdict == Verdict::Colliding && !hot.meshed
@@ -112,7 +112,7 @@ impl Narrow {
             && !(self.is_tight(slot) && memo.contacts_tick >= memo.tested)
     }
 
-    /// Whether a pair's interval is as narrow as its exact query makes it, at this tick's poses.
+    /// Whether a pair's interval is as narrow as its exact query can make it, at this tick's poses.
     fn is_tight(&self, slot: PairSlot) -> bool {
         let memo = &self.memos[slot.index()];
         memo.tight && (memo.tested == self.tick || memo.rest)

@@ -1,4 +1,4 @@
-//! Where queries that take several turns keep what they find, for all pairs.
+//! Storage for the results of queries that take several turns, for all pairs.
 
 use super::Narrow;
 use super::arena::Arena;
@@ -15,22 +15,22 @@ use crate::ids::PairSlot;
 /// The queries, and their entries.
 #[derive(Debug, Default)]
 pub(super) struct Shelves {
-    /// Of meshes and half-spaces.
+    /// Queries of meshes and half-spaces.
     pub(super) cursors: Pool<Cursor>,
-    /// Of pairs of single convex shapes that overlap.
+    /// Shells of pairs of single convex shapes that overlap.
     shells: Pool<Shell>,
-    /// Of a pair that has none yet.
+    /// Used for a pair that has none yet.
     spare: Shell,
-    /// What is carried of pairs of shapes of which one is a mesh.
+    /// Carried fronts of pairs of shapes of which one is a mesh.
     pub(super) fronts: Pool<CarriedFront>,
     /// The entries of fronts.
     pub(super) store: FrontStore,
-    /// Contacts that cursors and pairs of several shapes have found.
+    /// Contacts found by cursors and by pairs of several shapes.
     pub(super) contacts: Arena<Contact>,
 }
 
 impl Shelves {
-    /// Says that the shell at a place is wanted soon, if there is one.
+    /// Prefetches the shell at an index, if there is one.
     #[inline]
     pub(super) fn ask_ahead_for_shell(&self, at: u32) {
         if let Some(shell) = self.shells.get(at) {
@@ -43,7 +43,7 @@ impl Shelves {
         self.shells.get_mut(at).unwrap_or(&mut self.spare)
     }
 
-    /// Keeps what a query made of [`Shelves::shell`], if anything.
+    /// Stores what a query made of [`Shelves::shell`], if anything.
     pub(super) fn keep_shell(&mut self, at: &mut u32) {
         if self.shell(*at).is_empty() {
             self.shells.give(at);
@@ -54,7 +54,7 @@ impl Shelves {
         }
     }
 
-    /// Takes a shell back, if `at` is one.
+    /// Releases a shell, if `at` is one.
     pub(super) fn give_shell(&mut self, at: &mut u32) {
         if let Some(shell) = self.shells.get_mut(*at) {
             shell.clear();
@@ -62,7 +62,7 @@ impl Shelves {
         self.shells.give(at);
     }
 
-    /// Takes a front back, if `at` is one.
+    /// Releases a front, if `at` is one.
     pub(super) fn give_front(&mut self, at: &mut u32) {
         if let Some(front) = self.fronts.get_mut(*at) {
             front.release(&mut self.store);
@@ -70,7 +70,7 @@ impl Shelves {
         self.fronts.give(at);
     }
 
-    /// Takes a cursor back, if `at` is one.
+    /// Releases a cursor, if `at` is one.
     pub(super) fn give_cursor(&mut self, at: &mut u32) {
         if let Some(cursor) = self.cursors.get_mut(*at) {
             cursor.release(&mut self.store, &mut self.contacts);
@@ -80,10 +80,10 @@ impl Shelves {
 }
 
 impl Shelves {
-    /// Structure check of the pools, the arenas, and what each front and query has in them.
+    /// Structure check of the pools, the arenas, and of what each front and query holds in them.
     ///
     /// # Errors
-    /// The first thing that does not hold, in words.
+    /// The first violation, in words.
     pub(super) fn validate(
         &self,
         memos: &[Memo],
@@ -115,7 +115,7 @@ impl Shelves {
 }
 
 impl Narrow {
-    /// Whether work on a pair has come to its end without an answer, for want of room.
+    /// Whether work on a pair ended without a result because there was no room.
     pub(super) fn is_lost(&self, slot: PairSlot) -> bool {
         let memo = &self.memos[slot.index()];
         let (front, fronts) = (
@@ -126,7 +126,7 @@ impl Narrow {
             || fronts.is_some_and(|fronts| fronts.is_lost(&self.shelves))
     }
 
-    /// Gives back what work on a pair keeps from turn to turn.
+    /// Releases what work on a pair keeps from turn to turn.
     pub(super) fn give_back(&mut self, slot: PairSlot) {
         let memo = &mut self.memos[slot.index()];
         self.shelves.give_shell(&mut memo.shell);

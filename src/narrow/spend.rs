@@ -1,4 +1,4 @@
-//! Spending the budget: verdicts first, oldest first, in slices; and one turn of work on a pair, whatever it is for.
+//! Spending the budget: verdicts first, oldest first, in slices; and one turn of work on a pair, for any goal.
 
 use crate::ids::PairSlot;
 use crate::math::{Interval, relative};
@@ -17,13 +17,13 @@ use super::query::{
 };
 use super::{NONE, Narrow, Wanted};
 
-/// What a query is expected to take at most, nanoseconds: what takes longer was held up.
+/// The longest that a query is expected to take, nanoseconds: anything longer was held up by something else.
 const QUERY_NS_MAX: u64 = 100_000;
 
-/// By how much a pair may move between two queries for its shell to save time, in parts of the smaller body's radius.
+/// How far a pair may move between two queries for its shell to save time, as a share of the smaller body's radius.
 const FOLLOWED: f64 = 0.1;
 
-/// What a query found, and when and where it holds.
+/// The result of a query, and the tick and poses that it holds for.
 pub(super) struct Answer {
     pub(super) gap: Interval,
     pub(super) finished: bool,
@@ -31,9 +31,9 @@ pub(super) struct Answer {
 }
 
 impl Narrow {
-    /// Gives undecided pairs their verdicts, in slices; whether none is left.
+    /// Gives undecided pairs their verdicts, in slices. Returns whether none is left.
     ///
-    /// Nothing starves: see `order` for how long a pair waits for a turn at most.
+    /// Nothing starves: `order` states how long a pair waits for a turn at most.
     pub(super) fn spend_on_verdicts(
         &mut self,
         world: &World,
@@ -41,7 +41,7 @@ impl Narrow {
         meter: &mut Meter<'_>,
     ) -> bool {
         let work = std::mem::take(&mut self.undecided);
-        // With no limit the contacts are computed while the answer is at hand; else every verdict comes first.
+        // With no limit the contacts are computed along with the verdict; otherwise every verdict comes first.
         let at_once = wanted.order == Order::AsFound && wanted.contacts;
         let goal = if at_once {
             Goal::Contacts
@@ -66,8 +66,8 @@ impl Narrow {
         self.undecided.is_empty()
     }
 
-    /// One turn of work on a pair; whether nothing is left to do for `goal`. Where a query would take longer than what
-    /// is left, the meter closes.
+    /// One turn of work on a pair. Returns whether nothing is left to do for `goal`. If a query would take longer than
+    /// the time left, closes the meter.
     pub(super) fn work(
         &mut self,
         slot: PairSlot,
@@ -85,7 +85,7 @@ impl Narrow {
         };
         let query_ns = &mut self.memos[slot.index()].query_ns;
         if simple && !meter.begins(u64::from(*query_ns)) {
-            // What took long once, for whatever reason, is not put off for ever.
+            // A query that was slow once, for whatever reason, must not be put off for ever.
             *query_ns -= *query_ns / 8;
             return false;
         }
@@ -115,7 +115,7 @@ impl Narrow {
         self.widen_pair(slot, world);
         let memo = &self.memos[slot.index()];
         let verdict = memo.verdict();
-        // A resumed query may have been overtaken by motion: then another one starts at this tick's poses.
+        // Motion may have overtaken a resumed query: then another one starts at this tick's poses.
         let current = !open && memo.tested == self.tick;
         self.settle(slot, verdict);
         self.owe_report(slot, goal != Goal::Verdict && current);
@@ -125,8 +125,8 @@ impl Narrow {
         }
     }
 
-    /// A verdict found by a query that was asked for no more, or that has not come to its end yet, owes bounds and
-    /// contacts to whoever listens.
+    /// A verdict from a query that was run for the verdict alone, or is not finished, still owes bounds and contacts to
+    /// listeners.
     fn owe_report(&mut self, slot: PairSlot, whole: bool) {
         let reported = matches!(
             self.hot[slot.index()].verdict,
@@ -139,7 +139,7 @@ impl Narrow {
         }
     }
 
-    /// The one query that decides a pair of single shapes without meshes.
+    /// Runs the single query that decides a pair of single shapes without meshes.
     fn query_once(&mut self, slot: PairSlot, (a, b): (&Body, &Body), goal: Goal) {
         let rel = relative(&a.pose, &b.pose);
         let pos12 = shape_pose(&a.shapes[0], &b.shapes[0], &rel);
@@ -176,15 +176,15 @@ impl Narrow {
         }
     }
 
-    /// Whether last tick's contact is worth a look before anything else.
+    /// Whether last tick's contact is to be tested before anything else.
     pub(super) fn witness_due(&self, slot: PairSlot) -> bool {
         let memo = &self.memos[slot.index()];
         memo.witness.is_some_and(|w| w.best_m <= 0.0) && memo.retested != self.tick && !memo.rest
     }
 
-    /// Asks the shapes (and triangles) that touched last whether they still do: one unit, and while contact lasts the
-    /// verdict costs no more. Whether that was all of this turn: a pair that has waited for its verdict goes on at once
-    /// where it was in vain, or pairs that part would have their units spent on witnesses alone, tick after tick.
+    /// Tests whether the shapes (and triangles) that touched last still do: one unit, and while contact lasts the
+    /// verdict costs no more. Returns whether that was the whole turn. If it fails, a pair that has waited goes on in
+    /// the same turn, or pairs that part would spend their units on witnesses alone, tick after tick.
     fn retest_witness(
         &mut self,
         slot: PairSlot,
@@ -199,7 +199,7 @@ impl Narrow {
         self.still_touches(slot, (a, b)) || !has_waited
     }
 
-    /// Whether the witness is certified to touch at this tick's poses; then it is the pair's new certificate.
+    /// Whether the witness is certified to touch at this tick's poses; then it becomes the pair's new certificate.
     fn still_touches(&mut self, slot: PairSlot, (a, b): (&Body, &Body)) -> bool {
         let memo = &mut self.memos[slot.index()];
         let Some(last) = memo.witness else {
@@ -219,10 +219,10 @@ impl Narrow {
         let Some(closest) = closest.filter(|closest| closest.gap.max <= 0.0) else {
             return false;
         };
-        // A certified touch at these very poses; the lower end is what motion left of the old one.
+        // A certified touch at these very poses; the lower end is the old one less the motion since.
         let high = sound(closest.gap, one, other, &rel).max;
         if high + memo.reach_m > 0.0 {
-            // No touch by now, and what a walk has found so far is worth more.
+            // It no longer touches; what a walk has found so far is worth more.
             return false;
         }
         memo.gap = Interval {
@@ -249,9 +249,9 @@ impl Narrow {
         }
     }
 
-    /// Hands `found` to the pair's contact set; ids go on where the contact does.
+    /// Passes `found` to the pair's contact set; a contact that continues keeps its id.
     ///
-    /// * `tick` - of the poses that they were found at.
+    /// * `tick` - tick of the poses at which they were found.
     pub(super) fn keep_contacts(&mut self, slot: PairSlot, radius: f64, tick: u64) {
         let most = self.contacts_per_pair;
         let memo = &mut self.memos[slot.index()];

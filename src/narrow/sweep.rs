@@ -1,23 +1,23 @@
 //! Continuous bodies: whether two touch on the way from the last tick's poses to this one's, and when.
 //!
-//! In: the paths that the world keeps, a meter. Out: for each pair with a body that was swept, what is known of the
-//! way ([`Passage`]): free of touch, a touch within an interval of the share `s`, or not decided. The verdicts at this
-//! tick's poses are not concerned.
+//! In: the paths that the world keeps, a meter. Out: for each pair with a swept body, what is known of the way
+//! ([`Passage`]): free of touch, a touch within an interval of the share `s` of the motion, or not decided. The
+//! verdicts at this tick's poses are not affected.
 //!
-//! How: what the pair's certificate says of the last tick's poses, less the length of the way, is free. Else
-//! conservative advancement (see `advance`): from a share that is reached without touch, the pair surely goes on for a
-//! while; so the touch is approached from before it and never passed over. That there is one is certified by a pose at
-//! which the two are known to collide whatever rounding did to the way, sought just behind the share reached, by the
-//! slope of the gap. What comes as near as rounding and no nearer is open.
+//! How: if the pair's certificate at the last tick's poses exceeds the length of the way, the way is free. Otherwise
+//! conservative advancement (see `advance`): from a share reached without touch, the pair stays apart for a provable
+//! further share; so a touch is approached from before and never passed over. That there is a touch is certified by a
+//! pose at which the two collide whatever rounding did to the way, searched just behind the share reached, by the slope
+//! of the gap. A pair that comes as near as rounding, but no nearer, stays open.
 //!
-//! Sweeps come before the verdicts, because another tick has other poses: what is undecided at the end of this one is
-//! told as open. They take half of what the budget leaves, so that verdicts do not starve, and what verdicts leave;
-//! long ones, of what turns close beside another, what contacts leave.
+//! Sweeps come before the verdicts because the next tick has other poses: what is undecided at the end of this one is
+//! reported as open. They get half of what the budget leaves, so that verdicts do not starve, and what verdicts leave;
+//! long ones, of bodies that turn close to another, get what contacts leave.
 //!
-//! Refused: sampling (a wall is as thin as it likes); looking for the touch by bisection of the verdict (a bullet that
-//! ends behind the wall is apart at both ends); keeping an undecided sweep for later (nobody asks for it any more).
+//! Refused: sampling (a wall can be arbitrarily thin); searching for the touch by bisection of the verdict (a bullet
+//! that ends behind the wall is apart at both ends); keeping an undecided sweep for later (by then nothing needs it).
 //!
-//! Two bodies of which nobody says where the one was while the other went are not swept: see `in_step`.
+//! Two bodies are not swept when no frame says where one was while the other moved: see `in_step`.
 
 mod advance;
 mod asked;
@@ -45,11 +45,11 @@ use in_step::{apart_in_any_order, are_in_step};
 use motion::{Moment, length, way};
 use turns::Turns;
 
-/// Looks at a pair before the next one has its turn.
+/// Looks at a pair before the next pair has its turn.
 const SLICE_LOOKS: u32 = 8;
-/// Looks at a pair before contacts have their turn; what takes more has what they leave. A touch takes 5 to 40.
+/// Looks at a pair before contacts have their turn; longer sweeps get what contacts leave. A touch takes 5 to 40.
 pub(super) const FIRST_LOOKS: u32 = 160;
-/// Products of shares and times are off by some units of roundoff.
+/// Products of shares and times are off by a few units of roundoff.
 const SHORT: f64 = 1.0 - 1e-12;
 
 /// What is known of a pair's way from the last tick's poses to this one's.
@@ -57,7 +57,7 @@ const SHORT: f64 = 1.0 - 1e-12;
 pub enum Passage {
     /// They did not touch before the end.
     Free,
-    /// They touched: the first touch is within these shares of the motion.
+    /// They touched: the first touch is within this interval of shares of the motion.
     Touched(Interval),
     /// Not decided: if they touched, then within these shares.
     Open(Interval),
@@ -70,13 +70,13 @@ pub struct Swept {
     pub slot: PairSlot,
     /// What is known of its way.
     pub passage: Passage,
-    /// A body of it jumped: that part of the way was not asked.
+    /// One of its bodies jumped: that part of the way was not tested.
     pub jumped: bool,
-    /// A body of it jumped by a step beyond its `teleport_m`, and not over a reset.
+    /// One of its bodies jumped by a step beyond its `teleport_m`, and not over a reset.
     pub teleported: bool,
 }
 
-/// A sweep under way.
+/// A sweep in progress.
 #[derive(Debug)]
 struct Sweep {
     slot: PairSlot,
@@ -87,14 +87,14 @@ struct Sweep {
     teleported: bool,
     /// Free of touch up to here.
     free: f64,
-    /// A share at which they are known to touch; infinite: none is known.
+    /// A share at which they are known to touch; infinite: none known.
     hit: f64,
-    /// Rounding hides at `free` whether they touch, or for how long they do not: it goes no farther.
+    /// At `free`, rounding hides whether they touch, or how long they stay apart: the sweep cannot advance.
     stuck: bool,
-    /// The share asked last at which no touch was found, behind `free` and before `hit`.
+    /// The share tested last at which no touch was found, behind `free` and before `hit`.
     missed: f64,
     looks: u32,
-    /// What was free when it was last judged whether it comes to its end, and at how many looks that was.
+    /// `free` when it was last judged whether the sweep will finish, and the looks at that time.
     judged: (f64, u32),
     probes: u32,
     /// Share and gap at the last look.
@@ -104,37 +104,37 @@ struct Sweep {
     warm: Warm,
 }
 
-/// The sweeps of a tick, and what is kept to do them with.
+/// The sweeps of a tick, and the working memory for them.
 #[derive(Debug, Default)]
 pub(super) struct Sweeps {
     list: Vec<Sweep>,
-    /// Place in `list` by `PairSlot`; as long as the highest slot that was ever swept.
+    /// Index in `list` by `PairSlot`; as long as the highest slot that was ever swept.
     places: Vec<u32>,
     tools: Tools,
     turns: Turns,
-    /// This tick's have been told: nothing more is to be found out.
+    /// This tick's sweeps have been published: no more work on them.
     told: bool,
 }
 
 impl Narrow {
-    /// The pairs with a body that was swept in this tick, in no order that means anything.
+    /// The pairs with a body that was swept in this tick, in no particular order.
     pub fn swept(&self) -> impl Iterator<Item = Swept> + '_ {
         self.sweeps.list.iter().map(Sweep::outcome)
     }
 
-    /// What is known of a pair's way; `None`: nothing of it was swept.
+    /// What is known of a pair's way; `None`: it was not swept.
     #[must_use]
     pub fn passage(&self, slot: PairSlot) -> Option<Swept> {
         let at = *self.sweeps.places.get(slot.index())?;
         self.sweeps.list.get(at as usize).map(Sweep::outcome)
     }
 
-    /// Whether there is anything to sweep in this tick.
+    /// Whether this tick has any sweeps.
     pub(super) fn has_sweeps(&self) -> bool {
         !self.sweeps.list.is_empty()
     }
 
-    /// Forgets the sweeps of the tick before.
+    /// Forgets the sweeps of the last tick.
     pub(super) fn clear_sweeps(&mut self) {
         let Sweeps {
             list,
@@ -151,7 +151,7 @@ impl Narrow {
         *told = false;
     }
 
-    /// Lists the pairs of the bodies that were swept, with what is known of them for nothing.
+    /// Lists the pairs of the swept bodies, with what is known of them without a test.
     pub(super) fn enlist_sweeps(&mut self, world: &World, pairs: &PairSet) {
         for &slot in world.travelled() {
             let body = world.body(slot).filter(|body| body.in_broad);
@@ -177,7 +177,7 @@ impl Narrow {
         }
     }
 
-    /// A row shows the gap of this tick's poses beside the touch on the way.
+    /// Widens swept pairs to this tick's poses: a row shows that gap next to the touch on the way.
     pub(super) fn bring_up_swept(&mut self, world: &World) {
         for at in 0..self.sweeps.list.len() {
             let sweep = self.sweeps.list[at].outcome();
@@ -187,17 +187,17 @@ impl Narrow {
         }
     }
 
-    /// Sweeps are told.
+    /// The sweeps are published.
     pub(super) fn close_sweeps(&mut self) {
         self.sweeps.told = true;
     }
 }
 
 impl Sweeps {
-    /// Structure check: each sweep is where its pair says, and what they work with is theirs.
+    /// Structure check: each sweep stands where its pair's index says, and its working memory is its own.
     ///
     /// # Errors
-    /// The first thing that does not hold, in words.
+    /// The first violation, in words.
     pub(super) fn validate(&self) -> Result<(), String> {
         for (at, sweep) in (0..).zip(&self.list) {
             if self.places.get(sweep.slot.index()) != Some(&at) {
@@ -215,7 +215,7 @@ impl Sweeps {
 }
 
 impl Sweep {
-    /// A pair's sweep, and what is known of it before any look.
+    /// A pair's sweep, with what is known of it before any look.
     fn begin(
         (slot, at_a, at_b): (PairSlot, BodySlot, BodySlot),
         (a, b): (&Body, &Body),
@@ -254,7 +254,7 @@ impl Sweep {
         sweep
     }
 
-    /// One of which nothing is known.
+    /// A sweep of which nothing is known.
     fn fresh((slot, a, b): (PairSlot, BodySlot, BodySlot), warm: Warm) -> Self {
         Self {
             slot,
@@ -296,7 +296,7 @@ impl Sweep {
         }
     }
 
-    /// Some looks; ends early where the sweep is decided, given up, or the meter closes.
+    /// Some looks; ends early when the sweep is decided or given up, or the meter closes.
     fn turn(&mut self, bodies: (&Body, &Body), work: &mut Work<'_, '_>) {
         let stop = self.looks + SLICE_LOOKS;
         while !self.done && self.looks < stop && work.meter.open() {
@@ -327,14 +327,14 @@ impl Sweep {
                 Ahead::Free { time, gap_m } => self.go_on(&moment, time, gap_m),
             };
             if step <= 0.0 {
-                // It would ask the same again, and what was looked for ahead is looked for anew.
+                // It would repeat the same test; the probes ahead start over.
                 (self.stuck, self.missed, self.probes) = (true, self.free, 0);
             }
             self.close_in(bodies, step, work);
         }
     }
 
-    /// Whether it comes to its end with no looks that it may have: what grazes slows down for good.
+    /// Whether it cannot finish within the looks it may have: a grazing pair slows down for good.
     fn is_in_vain(&mut self) -> bool {
         let (free, looks) = self.judged;
         if self.looks < looks + FIRST_LOOKS {
@@ -349,7 +349,7 @@ impl Sweep {
     fn go_on(&mut self, moment: &Moment, time: f64, gap_m: f64) -> f64 {
         let here = self.free;
         let (last_s, last_m) = self.last;
-        // What is but rounding of the way tells no slope.
+        // Changes within the rounding of the way say nothing about the slope.
         if here > last_s && gap_m < last_m - moment.slop {
             self.slope = (last_m - gap_m) / (here - last_s);
         }

@@ -1,7 +1,7 @@
 //! Checks the whole structure of the narrow phase's memory: counts and verdicts, work lists, pools, arenas, fronts.
 //!
-//! What is held must be freed, and by one owner: so who holds what is gathered first, and compared with the books of
-//! the pools and arenas before anything that is in them is read.
+//! Each block must be free or have one owner, so the owners are collected first and compared with the records of the
+//! pools and arenas before any block is read.
 
 use super::Narrow;
 use super::memo::Memo;
@@ -10,10 +10,10 @@ use crate::pairs::PairSet;
 use crate::wire::Verdict;
 
 impl Narrow {
-    /// Structure check: counts, lists and memories agree, and all memory is free or of one owner.
+    /// Structure check: counts, lists and memories agree, and all memory is free or has one owner.
     ///
     /// # Errors
-    /// The first thing that does not agree, in words.
+    /// The first violation, in words.
     pub fn validate(&self, pairs: &PairSet) -> Result<(), String> {
         let lens = [self.hot.len(), self.memos.len(), self.urgencies.len()];
         if lens != [lens[0]; 3] {
@@ -72,7 +72,7 @@ impl Narrow {
         Ok(())
     }
 
-    /// A work list has each pair that says it is on it once, and none else but those that are gone since.
+    /// A work list has each pair that is marked as on it once, and no others except pairs that have ended since.
     fn validate_list(
         &self,
         what: &str,

@@ -1,4 +1,4 @@
-//! The motion pass: which certificates still hold. Costs in proportion to what moved.
+//! The motion pass: which certificates still hold. Its cost is proportional to what moved.
 
 use crate::ids::PairSlot;
 use crate::math::{Interval, ROUND, relative};
@@ -11,13 +11,13 @@ use super::memo::{Memo, closing};
 use super::mesh::Goal;
 use super::{NONE, Narrow};
 
-/// With so many slots a pair those that hold none are passed over, and not walked by.
+/// With this many slots per pair, the straight walk skips empty slots by the pair set's list.
 const SPARSE: usize = 4;
 
 impl Narrow {
-    /// Compares the pairs of every body that moved or whose status changed with their certificates.
+    /// Checks the pairs of every body that moved or whose status changed against their certificates.
     ///
-    /// Undecided pairs of earlier ticks are in the work list already; this adds those that have become undecided.
+    /// Undecided pairs of earlier ticks are on the work list already; this adds newly undecided ones.
     pub fn widen(&mut self, world: &World, pairs: &mut PairSet) {
         let changes = world.changes();
         let changed = changes.moved.len() + changes.restated.len();
@@ -31,7 +31,7 @@ impl Narrow {
                 self.follow_rules(slot, world);
             }
         }
-        // After a crowd that is over its pairs' slots are more than those of the pairs that are left.
+        // After a crowd has dispersed there are far more slots than pairs.
         let sparse = pairs.slots_len() / SPARSE > pairs.len();
         if many && !sparse {
             let slots = self.hot.len().min(pairs.slots_len());
@@ -67,8 +67,7 @@ impl Narrow {
         self.level = slots;
     }
 
-    /// Takes over what the rules now say of a pair whose bodies' rules changed: its certificate was made for the old
-    /// ones.
+    /// Applies the present rules to a pair whose bodies' rules changed: its certificate was made for the old ones.
     fn follow_rules(&mut self, slot: PairSlot, world: &World) {
         let hot = &mut self.hot[slot.index()];
         hot.expiry_m = f64::NEG_INFINITY;
@@ -76,7 +75,7 @@ impl Narrow {
         self.visit(slot, world);
     }
 
-    /// The stamp of this tick. After 2^32 ticks they begin anew, with no pair visited.
+    /// Advances this tick's stamp. After 2^32 ticks stamps start over, with no pair marked as visited.
     pub(super) fn next_stamp(&mut self) {
         self.stamp = self.stamp.wrapping_add(1);
         if self.stamp == 0 {
@@ -85,13 +84,13 @@ impl Narrow {
         }
     }
 
-    /// As after very many ticks.
+    /// Sets the stamp as after very many ticks.
     #[cfg(test)]
     pub(crate) fn set_stamp(&mut self, stamp: u32) {
         self.stamp = stamp;
     }
 
-    /// Visits a pair once in a tick: one comparison while its certificate holds.
+    /// Visits a pair once per tick: one comparison while its certificate holds.
     fn visit(&mut self, slot: PairSlot, world: &World) {
         let hot = &mut self.hot[slot.index()];
         if hot.visited == self.stamp {
@@ -111,8 +110,8 @@ impl Narrow {
         self.widen_pair(slot, world);
         let memo = &mut self.memos[slot.index()];
         let verdict = memo.verdict();
-        // An unbounded reach cannot be worked away, and a finished test at these very poses has said all it can. Where
-        // it was for a verdict alone, and bodies may be elsewhere, their gap is still to be asked.
+        // An unbounded reach cannot be reduced by work, and a finished test at exactly these poses cannot say more. But
+        // if it was for a verdict alone, and bodies may be elsewhere, their gap is still to be computed.
         let reachable = memo.widened_m() < f64::INFINITY;
         let has_said_it = memo.goal(Goal::Verdict) == Goal::Verdict || memo.tight;
         let is_told = memo.finished && memo.rest && has_said_it;
@@ -130,7 +129,7 @@ impl Narrow {
         self.settle(slot, verdict);
     }
 
-    /// Brings the interval of a pair that the motion pass passed over up to this tick's poses; its verdict stays.
+    /// Widens the interval of a pair that the motion pass skipped to this tick's poses; its verdict stays.
     pub fn bring_up(&mut self, slot: PairSlot, world: &World) {
         if self.finding(slot).is_some() {
             self.widen_pair(slot, world);
@@ -159,7 +158,7 @@ impl Narrow {
         memo.rest = motion_m == 0.0;
         (memo.motion_m, memo.reach_m) = (motion_m, reach_m);
         memo.now = widened(memo.gap, memo.widened_m());
-        // Where the pair may want work: what its place in the order of work depends on.
+        // The pair may need work: update what its place in the order of work depends on.
         if memo.now.min <= memo.report_m {
             let priority = a.priority.max(b.priority);
             let closing_m = closing(a, b, memo, &rel);
@@ -167,8 +166,8 @@ impl Narrow {
         }
         let known = |status| matches!(status, BodyStatus::Known | BodyStatus::Held);
         let still = reach_m == 0.0 && known(a.status) && known(b.status) && by_path.is_finite();
-        // The comparison that spares the next visits: gap_min - (spent - credit) > report.
-        // Only from a pair that is apart by it: nobody would come to say that another is so again.
+        // The comparison that saves the next visits: gap_min - (spent - credit) > report. Only for a pair that is apart
+        // by it: without a visit, nothing would report that another is apart again.
         let is_apart = memo.now.min > memo.report_m.max(0.0);
         hot.expiry_m = if still && is_apart && memo.cursor == NONE {
             let sum = memo.gap.min + memo.credit_m - memo.report_m.max(0.0);
@@ -180,19 +179,19 @@ impl Narrow {
 }
 
 impl Memo {
-    /// By how much `now` is wider than `gap`, metres; 0: it is `gap`.
+    /// How much wider `now` is than `gap`, metres; 0: it is `gap`.
     pub(super) fn widened_m(&self) -> f64 {
         self.motion_m + self.reach_m
     }
 
-    /// At this tick's poses, as if the bodies were there: what a test at them may begin with. `now` would count the
-    /// reach once more with each test.
+    /// The interval at this tick's poses, without the reach: what a test at these poses may start from. `now` would add
+    /// the reach again with each test.
     pub(super) fn here(&self) -> Interval {
         widened(self.gap, self.motion_m)
     }
 
-    /// What is asked of a pair that wants a verdict: at the poses alone it decides nothing where the bodies may be
-    /// elsewhere, but their gap may.
+    /// The goal of a pair that needs a verdict: if the bodies may be elsewhere, a verdict at the poses decides nothing,
+    /// but their gap may.
     pub(super) fn goal(&self, goal: Goal) -> Goal {
         match goal {
             Goal::Verdict if self.reach_m > 0.0 && !self.is_within_reach() => Goal::Gap,
@@ -200,14 +199,14 @@ impl Memo {
         }
     }
 
-    /// Whether no narrower interval decides the pair: both ends are nearer to 0 than the bodies' reach.
+    /// Whether no narrower interval can decide the pair: both ends are nearer to 0 than the bodies' reach.
     fn is_within_reach(&self) -> bool {
         let here = self.here();
         here.min > -self.reach_m && here.max <= self.reach_m
     }
 }
 
-/// An interval after bodies may have moved by so much, metres.
+/// An interval after bodies may have moved by `by_m`, metres.
 pub(super) fn widened(gap: Interval, by_m: f64) -> Interval {
     match by_m {
         0.0 => gap,

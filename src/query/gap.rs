@@ -1,5 +1,5 @@
-//! The gap of two bodies of a running daemon. In: names, and the world between two ticks. Out: a question that holds
-//! all it needs, so that a worker answers it while ticks go on; or why there is no answer.
+//! The gap of two bodies of a running daemon. In: names, and the world between two ticks. Out: a self-contained
+//! question that a worker answers while ticks go on; or why there is no answer.
 
 use super::measure::{Measured, WORK_NS, age_ns, fit};
 use crate::ids::BodySlot;
@@ -7,25 +7,25 @@ use crate::time::{Clock, Meter};
 use crate::wire::{GapFound, MessageHeader};
 use crate::world::{Body, World};
 
-/// Two bodies as they stood in one tick.
+/// Two bodies as of one tick.
 #[derive(Clone, Debug)]
 pub struct GapQuestion {
     a: Body,
     b: Body,
     report_m: f64,
     tick_header: MessageHeader,
-    /// What is odd about them, but legal.
+    /// Warnings: what is odd, but allowed.
     pub warnings: Vec<String>,
 }
 
 impl GapQuestion {
-    /// Takes the bodies as they stand.
+    /// Copies the bodies at their present poses.
     ///
-    /// * `tick_header` - of the tick that left the world so.
+    /// * `tick_header` - of the tick that left the world in this state.
     ///
     /// # Errors
-    /// Why there is no gap to tell, which body, and what to change: no such body, one whose place is not known, the
-    /// same one twice, two that have half-spaces.
+    /// Why there is no gap, which body, and what to change: no such body, one of unknown place, the same one twice, two
+    /// that have half-spaces.
     pub fn new(
         world: &World,
         tick_header: MessageHeader,
@@ -42,7 +42,7 @@ impl GapQuestion {
         })
     }
 
-    /// The bodies that the answer is worked out with.
+    /// The bodies that the answer is computed from.
     pub(super) fn bodies_mut(&mut self) -> impl Iterator<Item = &mut Body> {
         [&mut self.a, &mut self.b].into_iter()
     }
@@ -63,7 +63,7 @@ impl GapQuestion {
     }
 }
 
-/// The slot of a name.
+/// The slot of a body's name.
 pub(super) fn find(world: &World, name: &str) -> Result<BodySlot, String> {
     world.slot_named(name).ok_or_else(|| {
         let mend = match world.name_meant(name) {
@@ -77,7 +77,7 @@ pub(super) fn find(world: &World, name: &str) -> Result<BodySlot, String> {
 /// A body and its slot.
 type Found<'w> = (BodySlot, &'w Body);
 
-/// Two bodies of which a gap can be told, and what is odd about them.
+/// Two bodies with a defined gap, and warnings.
 ///
 /// # Errors
 /// Why there is none, which body, and what to change.

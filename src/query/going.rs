@@ -1,9 +1,9 @@
-//! How two bodies of a question go on. In: the world between two ticks, what the question says of their velocities.
-//! Out: a velocity and a pivot for each, and what is odd about them, but legal.
+//! How the two bodies of an impact query move on. In: the world between two ticks, the velocities that the question
+//! gives. Out: a velocity and a pivot for each, and warnings.
 //!
-//! What the question says of a body holds of that body and of the other, if that hangs on it and nothing is said of it.
-//! Else a body goes on as it was sent, and what hangs on another as the body at the root of all moves it: on an arc
-//! about that one's centre. Two that hang on one body are at rest as the one sees the other.
+//! What the question says of one body also holds for the other, if that one hangs on it and nothing is said of it.
+//! Otherwise a body moves on as it was sent, and one that hangs on another as the body at the root moves it: on an arc
+//! about that body's centre. Two that hang on the same body are at rest relative to each other.
 
 use super::measure::age_ns;
 use crate::ids::BodySlot;
@@ -12,18 +12,18 @@ use crate::scene::Velocity;
 use crate::wire::BodyStatus;
 use crate::world::{Body, World};
 
-/// How a body goes on.
+/// The motion of a body.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Going {
     /// Of its frame's origin, scene frame, metres a second.
     pub(super) linear: Vec3,
     /// Scene frame, radians a second.
     pub(super) angular: Vec3,
-    /// The point that goes straight, body frame.
+    /// The point that moves straight, body frame.
     pub(super) pivot: Point,
 }
 
-/// One of the two.
+/// One of the two bodies.
 #[derive(Clone, Copy)]
 pub(super) struct Goer<'q> {
     pub(super) slot: BodySlot,
@@ -32,7 +32,7 @@ pub(super) struct Goer<'q> {
 }
 
 impl Goer<'_> {
-    /// Whether the question says how it moves: then that is all that holds of it.
+    /// Whether the question gives its motion: then nothing else counts.
     fn is_told(&self) -> bool {
         self.asked.linear.is_some() || self.asked.angular.is_some()
     }
@@ -46,7 +46,7 @@ impl Goer<'_> {
         }
     }
 
-    /// As it was sent, or as what it hangs on was.
+    /// Its motion as it was sent, or as that of its root was.
     fn as_sent(&self, world: &World) -> Going {
         let (root, local) = world.root_of(self.slot);
         let centre = world
@@ -65,7 +65,7 @@ impl Goer<'_> {
         }
     }
 
-    /// As another body moves it, on which it hangs.
+    /// Its motion when it hangs on another body and is carried by it.
     fn carried(&self, by: &Self) -> Going {
         let Going {
             linear, angular, ..
@@ -81,7 +81,7 @@ impl Goer<'_> {
         }
     }
 
-    /// What is odd about the velocity that it was sent with.
+    /// Warning about the velocity that it was sent with.
     fn doubts(&self, world: &World) -> Option<String> {
         let body = self.body;
         if !body.moves {
@@ -110,7 +110,7 @@ impl Goer<'_> {
     }
 }
 
-/// How both go on; whether the one is at rest as the other sees it; adds what is odd to the warnings.
+/// The motions of both, and whether they are at rest relative to each other; adds warnings.
 pub(super) fn goings(
     world: &World,
     [a, b]: [Goer<'_>; 2],

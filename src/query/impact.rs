@@ -1,8 +1,8 @@
-//! When two bodies touch first if they go on as they do, or as a question says. In: the question, and the world between
-//! two ticks. Out: a question that holds all it needs; then a proved interval of the time, or a proof that they do not.
+//! When two bodies first touch if they move on as they do, or as a question says. In: the question, and the world
+//! between two ticks. Out: a self-contained question; then a proved interval of the time, or a proof of none.
 //!
-//! The way is that of continuous bodies: the centre of a body's geometry straight, or that of the body on which it
-//! hangs, its turn about one axis at a constant rate; and so is the method, conservative advancement.
+//! The motion is that of continuous bodies: the centre of a body's geometry, or of the body on which it hangs, moves
+//! straight, and the body rotates about one axis at a constant rate. So is the method: conservative advancement.
 
 use super::gap::both;
 use super::going::{Goer, Going, goings};
@@ -16,25 +16,25 @@ use crate::time::{Clock, Meter};
 use crate::wire::{ImpactFound, MessageHeader, Verdict};
 use crate::world::{Body, World};
 
-/// Two bodies as they stood in one tick, on their way from there.
+/// Two bodies as of one tick, with their motion from there.
 #[derive(Clone, Debug)]
 pub struct ImpactQuestion {
     a: Body,
     b: Body,
     within_s: f64,
-    /// The answer, as far as it needs no work.
+    /// The part of the answer that needs no work.
     found: ImpactFound,
-    /// What is odd, but legal.
+    /// Warnings: what is odd, but allowed.
     pub warnings: Vec<String>,
 }
 
 impl ImpactQuestion {
-    /// Takes the bodies as they stand.
+    /// Copies the bodies at their present poses.
     ///
-    /// * `tick_header` - of the tick that left the world so.
+    /// * `tick_header` - of the tick that left the world in this state.
     ///
     /// # Errors
-    /// As of a gap; and a half-space that is to move, a turn that is too far to be followed.
+    /// As for a gap; also a half-space that is to move, or a rotation too far to follow.
     pub fn new(world: &World, tick_header: MessageHeader, asked: &Impact) -> Result<Self, String> {
         let ((slot_a, a), (slot_b, b), mut warnings) = both(world, &asked.a, &asked.b)?;
         let goer = |slot, body, asked| Goer { slot, body, asked };
@@ -66,7 +66,7 @@ impl ImpactQuestion {
         })
     }
 
-    /// As of a gap.
+    /// As for a gap query.
     pub(super) fn bodies_mut(&mut self) -> impl Iterator<Item = &mut Body> {
         [&mut self.a, &mut self.b].into_iter()
     }
@@ -77,7 +77,7 @@ impl ImpactQuestion {
         self.answer_within(clock, None)
     }
 
-    /// As [`ImpactQuestion::answer`], with so many units of work at most.
+    /// As [`ImpactQuestion::answer`], with at most `units` units of work.
     #[must_use]
     pub fn answer_within(&self, clock: &dyn Clock, units: Option<u64>) -> ImpactFound {
         let now_ns = clock.boottime_ns();
@@ -111,7 +111,7 @@ fn on_way(body: &Body, going: &Going, within_s: f64) -> Result<Body, String> {
         pivot,
     } = *going;
     let (linear, angular) = if pivot == body.centre && is_ball(body) {
-        // What turns about its middle stays where it is, and no bound need allow for the turn.
+        // A body that rotates about its middle stays in place, and no bound needs to allow for the rotation.
         let arm = body.pose.rotation * body.centre.coords;
         (linear + angular.cross(&arm), Vec3::zeros())
     } else {
@@ -133,7 +133,7 @@ fn on_way(body: &Body, going: &Going, within_s: f64) -> Result<Body, String> {
     Ok(body.on_way_about(&pivot, linear, angular, within_s))
 }
 
-/// One sphere, about whose middle the body turns.
+/// Whether the body is one sphere that rotates about its middle.
 fn is_ball(body: &Body) -> bool {
     let [placed] = &*body.shapes else {
         return false;

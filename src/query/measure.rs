@@ -1,4 +1,4 @@
-//! Two bodies measured for a question: what answers about a gap have in common. In: bodies as they stand, a [`Meter`].
+//! Two bodies measured for a query: what gap answers have in common. In: bodies at their present poses, a [`Meter`].
 //! Out: a sound interval with its verdict and witness, scene frame; and whether a body's place is known at all.
 
 use crate::ids::{BodyId, BodySlot};
@@ -8,9 +8,9 @@ use crate::time::{Clock, Meter};
 use crate::wire::{BodyStatus, GapKnown, Verdict};
 use crate::world::{Body, Parts, World};
 
-/// Longest work on one answer, nanoseconds; then what is proved by then is the answer, an interval that is sound.
+/// Longest work on one answer, nanoseconds; then the answer is what is proved so far, a sound interval.
 pub(super) const WORK_NS: u64 = 1_000_000_000;
-/// Before that its boxes are fitted, for so long at most, nanoseconds.
+/// Longest time for fitting its boxes before that, nanoseconds.
 const FIT_NS: u64 = WORK_NS / 4;
 
 /// What is known of the gap of A and B. Metres, scene frame.
@@ -26,14 +26,14 @@ pub(super) struct Measured {
     point_b: Option<[f64; 3]>,
     /// Unit, from A to B.
     pub(super) normal: Option<[f64; 3]>,
-    /// Place of B's shape there, and its triangle or `NO_INDEX`.
+    /// Index of B's shape there, and its triangle or `NO_INDEX`.
     pub(super) place_b: Option<(u32, u32)>,
 }
 
 impl Measured {
     /// Measures them.
     ///
-    /// * `report_m` - nearer than this is `near`, metres.
+    /// * `report_m` - pairs nearer than this are `near`, metres.
     pub(super) fn of(a: &Body, b: &Body, report_m: f64, meter: &mut Meter<'_>) -> Self {
         let asked = gap_between(a, b, report_m, meter);
         let place = |body: &Body, point: &Point| (body.pose * point).coords.into();
@@ -54,7 +54,7 @@ impl Measured {
         }
     }
 
-    /// As it is told.
+    /// In the form of an answer.
     pub(super) fn told(&self) -> GapKnown {
         let finite = |end: f64| end.is_finite().then_some(end);
         let Interval { min, max } = self.gap;
@@ -63,7 +63,7 @@ impl Measured {
             touching: self.touching,
             gap_min_m: finite(min),
             gap_max_m: finite(max),
-            // An estimate is never outside what is proved.
+            // An estimate is never outside the proved interval.
             gap_best_m: self.best_m.and_then(|best| finite(best.max(min).min(max))),
             point_a: self.point_a,
             point_b: self.point_b,
@@ -78,10 +78,10 @@ pub(super) fn age_ns(body: &Body, now_ns: u64) -> Option<u64> {
     Some(now_ns.saturating_sub(since_ns))
 }
 
-/// Fits the boxes of bodies that deform to their vertices, in copies of their own: the engine fits those alone of which
-/// a pair waits, and boxes of long ago tell nothing apart. A body that is there several times is fitted once.
+/// Fits the boxes of bodies that deform to their vertices, in private copies: the engine fits only those for which a
+/// pair waits, and outdated boxes prove nothing apart. A body that occurs several times is fitted once.
 ///
-/// For [`FIT_NS`] at most, and the last of them: the others are measured as they are, which takes longer.
+/// For at most [`FIT_NS`]; the remaining bodies are measured as they are, which takes longer.
 pub(super) fn fit_boxes<'b>(bodies: impl Iterator<Item = &'b mut Body>, clock: &dyn Clock) {
     let end_ns = clock.monotonic_ns().saturating_add(FIT_NS);
     let mut fitted: Vec<(BodyId, Parts)> = Vec::new();
@@ -98,10 +98,10 @@ pub(super) fn fit_boxes<'b>(bodies: impl Iterator<Item = &'b mut Body>, clock: &
     }
 }
 
-/// Whether a body's place is known; what is odd about it, but legal.
+/// Whether a body's place is known; returns a warning about it, if any.
 ///
 /// # Errors
-/// Why it is not, which body, and what to change.
+/// Why it is not known, which body, and what to change.
 pub(super) fn fit(world: &World, slot: BodySlot, body: &Body) -> Result<Option<String>, String> {
     let name = &body.name;
     match body.status {
@@ -123,15 +123,15 @@ pub(super) fn fit(world: &World, slot: BodySlot, body: &Body) -> Result<Option<S
     }
 }
 
-/// The body whose pose and vertices a body waits for: the one that it hangs on in the end, itself where it hangs on
-/// none. What hangs on another does not deform.
+/// The body whose pose and vertices a body waits for: its root, or itself if it hangs on none. A body that hangs on
+/// another does not deform.
 fn awaited<'w>(world: &'w World, slot: BodySlot, body: &'w Body) -> &'w Body {
     let root = world.root_of(slot).0;
     let root = world.body(root).filter(|_| root != slot);
     root.unwrap_or(body)
 }
 
-/// What has not come of a body.
+/// What has not been received for a body.
 fn not_received(world: &World, slot: BodySlot, body: &Body) -> String {
     let of = awaited(world, slot, body);
     let vertices = of.vertices.as_deref();
@@ -152,7 +152,7 @@ fn not_received(world: &World, slot: BodySlot, body: &Body) -> String {
     )
 }
 
-/// What was refused of a body.
+/// What was refused of a body's data.
 fn rejected(world: &World, slot: BodySlot, body: &Body) -> String {
     let of = awaited(world, slot, body);
     let bent = of.vertices.as_deref().and_then(|v| v.refused);

@@ -1,4 +1,4 @@
-//! Queries: offline, of shape pairs; and of a running daemon, of its bodies as a tick left them.
+//! Queries: offline, of shape pairs; and of a running daemon, of its bodies as of a tick.
 pub mod batch;
 mod gap;
 mod going;
@@ -21,23 +21,23 @@ use crate::time::Clock;
 use crate::wire::{Answer, MessageHeader};
 use crate::world::{Parts, World};
 
-/// A question with all that it needs, so that a worker answers it while ticks go on.
+/// A self-contained question that a worker answers while ticks go on.
 #[derive(Clone, Debug)]
 pub enum Query {
-    /// For the gap of two bodies.
+    /// The gap of two bodies.
     Gap(Box<GapQuestion>),
-    /// For what a body or a shape touches.
+    /// What a body or a shape touches.
     Touching(Box<TouchingQuestion>),
-    /// For what a ray hits.
+    /// What a ray hits.
     Ray(Box<RayQuestion>),
-    /// For when two bodies touch.
+    /// When two bodies touch.
     Impact(Box<ImpactQuestion>),
 }
 
 impl Query {
-    /// Takes the bodies as they stand.
+    /// Copies the bodies at their present poses.
     ///
-    /// * `header` - of the tick that left the world so.
+    /// * `header` - of the tick that left the world in this state.
     /// * `shapes` - those of [`Question::shapes`], built.
     ///
     /// # Errors
@@ -61,7 +61,7 @@ impl Query {
         }
     }
 
-    /// What is odd, but legal.
+    /// Warnings: what is odd, but allowed.
     pub fn warnings(&mut self) -> &mut Vec<String> {
         match self {
             Self::Gap(question) => &mut question.warnings,
@@ -71,7 +71,7 @@ impl Query {
         }
     }
 
-    /// Works on the answer, for a second at most, and before that for a quarter of one where boxes are to be fitted.
+    /// Works on the answer, for a second at most, and before that for a quarter of a second if boxes must be fitted.
     #[must_use]
     pub fn answer(mut self, clock: &dyn Clock) -> Answer {
         let mut answer = Answer {

@@ -1,7 +1,7 @@
-//! Who may be near what is asked for: pairs of boxes, the nearest of which are kept.
+//! Which bodies may be near the queried ones: pairs of boxes, of which the nearest are kept.
 //!
-//! In: pairs in any order, and how far apart their boxes are. Out: as many as there is room for, and how many there was
-//! none for. Memory is bounded by the room, however many pairs come.
+//! In: pairs in any order, and the distance of their boxes. Out: as many as there is room for, and how many found none.
+//! Memory is bounded by the room, however many pairs come.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -10,12 +10,12 @@ use crate::ids::{BodyId, BodySlot};
 use crate::math::Aabb;
 use crate::world::Body;
 
-/// A pair that may be near, before it is copied; the nearest is the least.
+/// A pair that may be near, before it is copied; the nearest compares least.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hit {
-    /// It is no nearer, metres.
+    /// Lower bound on its distance, metres.
     pub(super) bound_m: f64,
-    /// Place of what is asked for.
+    /// Index of the queried body.
     pub(super) asked: usize,
     pub(super) id: BodyId,
     pub(super) slot: BodySlot,
@@ -42,18 +42,18 @@ impl PartialEq for Hit {
 
 impl Eq for Hit {}
 
-/// The nearest of all that came.
+/// The nearest of all pairs so far.
 #[derive(Debug)]
 pub(super) struct Nearest {
     room: usize,
-    /// The farthest is on top: it goes first.
+    /// The farthest is on top: it is dropped first.
     kept: BinaryHeap<Hit>,
-    /// Pairs there was no room for.
+    /// Pairs that found no room.
     pub(super) left_out: u64,
 }
 
 impl Nearest {
-    /// None yet, and room for so many.
+    /// Empty, with room for this many.
     pub(super) fn new(room: usize) -> Self {
         Self {
             room,
@@ -79,19 +79,19 @@ impl Nearest {
     }
 }
 
-/// What is asked for in groups of neighbours with a box around each: who is far from a group is far from all of it, so
-/// that many parts among many bodies are not held against each other one by one.
+/// The queried bodies in groups of neighbours with a box around each: a body far from a group is far from all of it, so
+/// that many parts among many bodies are not compared one by one.
 pub(super) struct Groups {
     /// The box around all.
     pub(super) whole: Aabb,
-    /// Places of what is asked for, group by group.
+    /// Indices of the queried bodies, group by group.
     places: Vec<usize>,
-    /// The box around each group, and where it ends in `places`.
+    /// The box around each group, and its end in `places`.
     boxes: Vec<(Aabb, usize)>,
 }
 
 impl Groups {
-    /// As many groups as each has members, along the longest side of them all.
+    /// As many groups as each has members, along the longest side of their common box.
     pub(super) fn of(asked: &[Body]) -> Self {
         let whole = around(asked.iter());
         let axis = whole.half_extents().imax();
@@ -112,7 +112,7 @@ impl Groups {
         }
     }
 
-    /// Places of those whose box may be as near as this, metres.
+    /// Indices of those whose box may be this near, metres.
     pub(super) fn near(&self, other: &Aabb, within_m: f64) -> impl Iterator<Item = usize> {
         let mut begin = 0;
         let near = self.boxes.iter().map(move |(group, end)| {

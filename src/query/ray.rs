@@ -1,10 +1,10 @@
-//! What a ray hits first. In: the question, and the world between two ticks. Out: a question that holds all it needs;
-//! then the body that is hit, with a proved interval of the distance, or a proof that none is.
+//! What a ray hits first. In: the question, and the world between two ticks. Out: a self-contained question; then the
+//! body that is hit, with a proved interval of the distance, or a proof that none is.
 //!
 //! How: the ray is cut where it passes the boxes of bodies, nearest first. A piece of it is a body without thickness:
-//! what the query of two bodies proves apart is free, what it certifies to collide is hit, so halving the first piece
-//! that is not free closes in on the hit from both sides, for every kind of shape, surfaces too. From a free piece the
-//! ray is free for another stretch as long as the gap. Refused: a formula a shape, each with its proof of rounding.
+//! proved apart by the query of two bodies it is free, certified to collide it is hit. So halving the first piece that
+//! is not free closes in on the hit from both sides, for every kind of shape, surfaces too. From a free piece the ray
+//! is free for another stretch as long as the gap. Refused: a formula per shape, each with its proof of rounding.
 
 use std::sync::Arc;
 
@@ -21,11 +21,11 @@ use crate::time::{Clock, Meter};
 use crate::wire::{BodyStatus, MessageHeader, NO_INDEX, RayFound, Verdict};
 use crate::world::{Body, Parts, PlacedShape, World};
 
-/// Pieces of one ray that one body is asked for at most: a hit takes some 50, one that grazes more.
+/// Most pieces of one ray that are tested against one body: a hit takes some 50, a grazing ray more.
 const LOOKS_MAX: u32 = 400;
-/// The normal is taken so far in front of the hit, in parts of the body's size: nearer, rounding would turn it.
+/// The normal is computed this far in front of the hit, as a share of the body's size: nearer, rounding would turn it.
 const STAND_OFF: f64 = 1e-6;
-/// How far in front of the hit the normal of a body without a finite size is taken, metres.
+/// The same distance for a body without a finite size, metres.
 const STAND_OFF_M: f64 = 1e-3;
 
 /// A ray, and the bodies whose boxes it passes.
@@ -37,13 +37,13 @@ pub struct RayQuestion {
     /// Turns z into it.
     turn: Quat,
     max_m: f64,
-    /// By where their boxes begin.
+    /// Sorted by where their boxes begin.
     near: Vec<Near>,
-    /// Where the box of the first of those begins for which there was no room, metres.
+    /// Where the box of the first body that found no room begins, metres.
     left_out_from_m: f64,
-    /// The answer, as far as it needs no work.
+    /// The part of the answer that needs no work.
     found: RayFound,
-    /// What is odd, but legal.
+    /// Warnings: what is odd, but allowed.
     pub warnings: Vec<String>,
 }
 
@@ -51,7 +51,7 @@ pub struct RayQuestion {
 #[derive(Clone, Debug)]
 struct Near {
     body: Body,
-    /// It is within the box from here to `leave_m`, metres along the ray; before, it is free.
+    /// The ray is in the box from here to `leave_m`, metres along the ray; before, it is free.
     enter_m: f64,
     leave_m: f64,
 }
@@ -63,9 +63,9 @@ struct Cast {
     free_m: f64,
     /// Known to be hit by here, metres; infinite: no hit is known.
     hit_m: f64,
-    /// The end of the first piece that rounding does not tell from a touch, metres; infinite: none is known.
+    /// The end of the first piece that rounding cannot distinguish from a touch, metres; infinite: none is known.
     touch_m: f64,
-    /// The end of the first piece that is not known to be free, metres: what it meets first lies in it.
+    /// The end of the first piece that is not known to be free, metres: the first hit lies in it.
     until_m: f64,
     inside: bool,
     /// Not hit at all.
@@ -73,15 +73,15 @@ struct Cast {
 }
 
 impl RayQuestion {
-    /// Takes the bodies as they stand.
+    /// Copies the bodies at their present poses.
     ///
-    /// * `tick_header` - of the tick that left the world so.
+    /// * `tick_header` - of the tick that left the world in this state.
     ///
-    /// Cost: O(bodies), and a copy of each whose box is passed.
+    /// Cost: O(bodies), and a copy of each whose box the ray passes.
     #[must_use]
     pub fn new(world: &World, tick_header: MessageHeader, ray: &Ray) -> Self {
         let direction = Vec3::from(ray.direction);
-        // Scaled by its largest part first, so that neither 1e-200 nor 1e200 loses it.
+        // Scaled by its largest component first, so that neither 1e-200 nor 1e200 loses it.
         let direction = (direction / direction.amax()).normalize();
         let mut question = Self {
             from: Point::from(ray.from),
@@ -143,13 +143,13 @@ impl RayQuestion {
         (self.found.unknown, self.found.unknown_left_out) = unknown.take();
     }
 
-    /// Where the ray surely holds what it has within a box; `None`: it passes by.
+    /// The range of the ray that surely contains its part within a box; `None`: it passes by.
     fn passage(&self, of: &Aabb) -> Option<(f64, f64)> {
         let (mut enter_m, mut leave_m) = (0.0_f64, self.max_m);
         for k in 0..3 {
             let (low, high) = (of.min[k] - self.from[k], of.max[k] - self.from[k]);
             let along = self.direction[k];
-            // The direction and both differences are rounded; what it goes astray by grows with the way.
+            // The direction and both differences are rounded; the error grows with the distance.
             let slack = |way: f64| 8.0 * ROUND * (way.abs() + self.from[k].abs());
             if along.abs() <= 1e-9 {
                 let astray = 1e-9 * leave_m.min(1e18) * f64::from(u8::from(along != 0.0));
@@ -177,7 +177,7 @@ impl RayQuestion {
         (enter_m <= leave_m).then_some((enter_m, leave_m))
     }
 
-    /// As of a gap.
+    /// As for a gap query.
     pub(super) fn bodies_mut(&mut self) -> impl Iterator<Item = &mut Body> {
         self.near.iter_mut().map(|near| &mut near.body)
     }
@@ -188,7 +188,7 @@ impl RayQuestion {
         self.answer_within(clock, None)
     }
 
-    /// As [`RayQuestion::answer`], with so many units of work at most.
+    /// As [`RayQuestion::answer`], with at most `units` units of work.
     #[must_use]
     pub fn answer_within(&self, clock: &dyn Clock, units: Option<u64>) -> RayFound {
         let now_ns = clock.boottime_ns();
@@ -196,7 +196,7 @@ impl RayQuestion {
         let mut meter = Meter::new(clock, Some(end_ns), units);
         let mut best: Option<(&Near, Cast)> = None;
         let mut open: Vec<(&Near, Cast)> = Vec::new();
-        // Who is hit within rounding of the first is not told apart from it.
+        // A body hit within rounding of the first cannot be distinguished from it.
         let mut tied_m = f64::INFINITY;
         for near in &self.near {
             let hit_m = best.map_or(f64::INFINITY, |(_, cast)| cast.hit_m);
@@ -248,7 +248,7 @@ impl RayQuestion {
         clock: &dyn Clock,
         found: &mut RayFound,
     ) {
-        // How deep a piece is in a round shape is known to some 1e-8 of its size, where it touches to some 1e-12.
+        // The depth of a piece in a round shape is known to some 1e-8 of its size, its point of touch to some 1e-12.
         let end_m = cast.hit_m.min(cast.until_m).max(cast.free_m);
         let at_m = cast.free_m + (end_m - cast.free_m) / 2.0;
         found.body = Some(near.body.name.clone());
@@ -268,10 +268,10 @@ impl RayQuestion {
         };
         let before_m = (cast.free_m - off_m.max(1e4 * self.slop_m(at_m))).max(0.0);
         let probe = self.piece(before_m, before_m);
-        // A little more work, whatever the rest took.
+        // A little more work, regardless of how much the rest took.
         let mut meter = Meter::new(clock, None, Some(100_000));
         let seen = Measured::of(&probe, &near.body, 0.0, &mut meter);
-        // Of a surface that the ray begins on, the query may tell either side.
+        // For a surface that the ray begins on, the query may report either side.
         found.normal = seen.normal.map(|normal| {
             let towards = Vec3::from(normal);
             let is_ahead = towards.dot(&self.direction) >= 0.0 || before_m > 0.0;
@@ -300,7 +300,7 @@ impl RayQuestion {
                 return cast;
             }
             if end_m <= 0.0 {
-                // There is no piece to look at.
+                // There is no piece to test.
                 cast.misses = start.gap.min > 0.0;
                 return cast;
             }
@@ -308,18 +308,18 @@ impl RayQuestion {
         let mut whole = true;
         for _ in 0..LOOKS_MAX {
             if cast.free_m >= cast.touch_m {
-                // Finer looks found that nothing is touched there.
+                // Finer tests found no touch there.
                 cast.touch_m = f64::INFINITY;
             }
             let last_m = end_m.min(cast.hit_m).min(cast.touch_m);
             if cast.free_m >= cast.until_m {
                 if cast.until_m >= last_m {
-                    // Each piece by itself is free, so all of it is.
+                    // Each piece is free, so the whole is.
                     cast.misses = cast.hit_m == f64::INFINITY;
                     break;
                 }
                 cast.until_m = last_m;
-                // What is too short to be halved is looked at as it is.
+                // A piece too short to be halved is tested as it is.
                 whole = last_m - cast.free_m <= 4.0 * self.slop_m(last_m);
             }
             let until_m = cast.until_m;
@@ -339,15 +339,15 @@ impl RayQuestion {
                 continue;
             }
             cast.until_m = middle_m;
-            // What is but within rounding of a touch may still be in front of it.
+            // A piece only within rounding of a touch may still be in front of it.
             if seen.gap.max <= 0.0 || self.is_hit(near, cast.free_m, middle_m, meter) {
                 cast.hit_m = middle_m;
             } else if seen.touching || seen.gap.max <= 2.0 * slop_m {
                 cast.touch_m = middle_m;
             }
         }
-        // A ray that grazes touches, and touching counts as a hit: where that is told from a way of many pieces, each
-        // within the rounding of its far end, it is not.
+        // A grazing ray touches, and touching counts as a hit: but not if that was found only on a stretch of many
+        // pieces, each within the rounding of its far end.
         let is_closed = cast.until_m - cast.free_m <= 4.0 * self.slop_m(cast.until_m);
         if cast.hit_m.is_infinite() && !cast.misses && is_closed && cast.touch_m <= cast.until_m {
             cast.hit_m = cast.touch_m;
@@ -356,9 +356,8 @@ impl RayQuestion {
         cast
     }
 
-    /// Whether a ray that is free up to `free_m` certainly hits by `to_m`: where it is within the body then, or a piece
-    /// that begins well in front crosses the surface. One that begins at the surface only touches it, to all that
-    /// rounding tells.
+    /// Whether a ray that is free up to `free_m` certainly hits by `to_m`: it is within the body then, or a piece that
+    /// begins well in front crosses the surface. One that begins at the surface may only touch it, within rounding.
     fn is_hit(&self, near: &Near, free_m: f64, to_m: f64, meter: &mut Meter<'_>) -> bool {
         let before_m = (2.0 * free_m - to_m).max(0.0);
         let mut proves = |from_m| self.look(near, from_m, to_m, meter).gap.max <= 0.0;
@@ -369,7 +368,7 @@ impl RayQuestion {
         Measured::of(&self.piece(from_m, to_m), &near.body, 0.0, meter)
     }
 
-    /// How far rounding may put a piece of the ray that ends there off the ray, metres.
+    /// How far rounding may displace a piece of the ray that ends there, metres.
     fn slop_m(&self, to_m: f64) -> f64 {
         64.0 * ROUND * (self.from.coords.amax() + to_m)
     }
@@ -391,9 +390,9 @@ impl RayQuestion {
     }
 }
 
-/// A turn that lays the z axis along a line, either way: a piece of a ray has no front.
+/// A rotation that lays the z axis along a line, in either direction: a piece of a ray has no front.
 ///
-/// By the half angle: an angle found from a cosine is lost near 0 and near pi.
+/// By the half angle: an angle computed from a cosine is inaccurate near 0 and near pi.
 fn turn_of_axis(line: &Vec3) -> Quat {
     let up = if line.z < 0.0 { -line } else { *line };
     Quat::new_normalize(Quaternion::new(1.0 + up.z, -up.y, up.x, 0.0))

@@ -1,12 +1,12 @@
-//! What a body or a shape touches, or would touch if it were somewhere. In: the question, and the world between two
-//! ticks. Out: a question that holds all it needs; then a row for each body that is not proved farther than asked for.
+//! What a body or a shape touches, or would touch at another place. In: the question, and the world between two ticks.
+//! Out: a self-contained question; then a row for each body that is not proved farther than the queried distance.
 //!
-//! How: one pass over the boxes of all bodies finds who may be near. Those are copied (their shapes are shared), and
-//! the worker asks for each gap in turn, nearest box first: little work for each, then as much as the second allows. A
-//! box that is far is a proof; whoever has no box because its place is not known is named, so that silence is none.
+//! How: one pass over the boxes of all bodies finds those that may be near. They are copied (their shapes are shared),
+//! and the worker queries each gap in turn, nearest box first: little work for each, then as much as the second allows.
+//! A far box is a proof; a body that has no box because its place is not known is named, so that silence is no proof.
 //!
-//! What hangs on the body goes with it and is asked for too: its pose is the body's. Refused: a search in the broad
-//! phase's own order, which differs by method and is rearranged while it is read.
+//! Bodies that hang on the queried body move with it and are queried too. Refused: a search in the broad phase's own
+//! order, which differs by method and is rearranged while it is read.
 
 use std::cmp::Reverse;
 
@@ -23,47 +23,47 @@ use crate::time::{Clock, Meter};
 use crate::wire::{BodyStatus, MessageHeader, TouchingFound, TouchingRow, Verdict};
 use crate::world::{Body, Parts, World};
 
-/// Units for each pair before any has more: convex pairs and most meshes are done by then.
+/// Units for each pair before any gets more: convex pairs and most meshes are done by then.
 const FIRST_UNITS: u64 = 2_000;
 
-/// A body or a shape where it is asked for, and who may be near.
+/// A body or a shape at the queried place, and the bodies that may be near.
 #[derive(Clone, Debug)]
 pub struct TouchingQuestion {
-    /// What is asked for, where it is asked for: the body first, then what hangs on it.
+    /// The queried bodies at the queried place: the body first, then those that hang on it.
     asked: Vec<Body>,
-    /// It is a body; else a shape.
+    /// The question is about a body; otherwise a shape.
     is_body: bool,
-    /// Its pose is the one that it has.
+    /// Its pose is its present one.
     in_place: bool,
     within_m: f64,
     near: Vec<Near>,
-    /// The answer, as far as it needs no work.
+    /// The part of the answer that needs no work.
     found: TouchingFound,
-    /// What is odd, but legal.
+    /// Warnings: what is odd, but allowed.
     pub warnings: Vec<String>,
 }
 
 /// Another body that may be near.
 #[derive(Clone, Debug)]
 struct Near {
-    /// Place in `asked`.
+    /// Index in `asked`.
     asked: usize,
     body: Body,
-    /// It is no nearer, where this is above 0, metres.
+    /// Lower bound on its distance, if above 0, metres.
     bound_m: f64,
 }
 
 impl TouchingQuestion {
-    /// Takes the bodies as they stand.
+    /// Copies the bodies at their present poses.
     ///
-    /// * `tick_header` - of the tick that left the world so.
-    /// * `shapes` - those of the question, built, where it has any.
+    /// * `tick_header` - of the tick that left the world in this state.
+    /// * `shapes` - those of the question, built, if it has any.
     ///
-    /// Cost: a look at the box of each body and at each pair of near boxes, and a copy of those there is room for.
+    /// Cost: a look at the box of each body and at each pair of near boxes, and a copy of those that find room.
     ///
     /// # Errors
-    /// Why there is no answer, which body, and what to change: no such body, it is disabled, it is to be asked for
-    /// where it is and that is not known, its vertices are not known.
+    /// Why there is no answer, which body, and what to change: no such body, it is disabled, its present place is
+    /// queried and not known, its vertices are not known.
     pub fn new(
         world: &World,
         tick_header: MessageHeader,
@@ -107,7 +107,7 @@ impl TouchingQuestion {
         Ok(question)
     }
 
-    /// Finds who may be near by the boxes, and counts who is not to be looked at or cannot be.
+    /// Finds the bodies that may be near by their boxes, and counts those that must not or cannot be tested.
     fn look_around(&mut self, world: &World, asked: &Touching, slots: &[BodySlot]) -> Nearest {
         let (mut hits, mut unknown) = (Nearest::new(TOUCHING_ROWS_MAX), Unknown::default());
         let groups = Groups::of(&self.asked);
@@ -116,7 +116,7 @@ impl TouchingQuestion {
                 Whereabouts::InItsBox => self.within_m,
                 Whereabouts::HeldThere | Whereabouts::Anywhere => f64::INFINITY,
             };
-            // Most bodies are far from all.
+            // Most bodies are far from all queried ones.
             if groups.whole.distance(&other.proxy) > reach_m || slots.contains(&slot) {
                 continue;
             }
@@ -158,7 +158,7 @@ impl TouchingQuestion {
         hits
     }
 
-    /// Copies those there is room for: the nearest, by their boxes.
+    /// Copies those that find room: the nearest, by their boxes.
     fn keep(&mut self, world: &World, hits: Nearest) {
         self.found.left_out = hits.left_out;
         self.found.complete &= hits.left_out == 0;
@@ -175,7 +175,7 @@ impl TouchingQuestion {
             .collect();
     }
 
-    /// As of a gap.
+    /// As for a gap query.
     pub(super) fn bodies_mut(&mut self) -> impl Iterator<Item = &mut Body> {
         let near = self.near.iter_mut().map(|near| &mut near.body);
         self.asked.iter_mut().chain(near)
@@ -187,7 +187,7 @@ impl TouchingQuestion {
         self.answer_within(clock, None)
     }
 
-    /// As [`TouchingQuestion::answer`], with so many units of work at most.
+    /// As [`TouchingQuestion::answer`], with at most `units` units of work.
     #[must_use]
     pub fn answer_within(&self, clock: &dyn Clock, units: Option<u64>) -> TouchingFound {
         let now_ns = clock.boottime_ns();
@@ -239,7 +239,7 @@ impl TouchingQuestion {
 
 impl Near {
     fn measure(&self, asked: &Body, within_m: f64, meter: &mut Meter<'_>) -> Measured {
-        // What is exactly as far as asked for is near.
+        // A body exactly at the queried distance counts as near.
         let mut known = Measured::of(asked, &self.body, within_m.next_up(), meter);
         if self.bound_m > known.gap.min && self.bound_m > 0.0 {
             known.gap.min = self.bound_m.min(known.gap.max);
@@ -251,7 +251,7 @@ impl Near {
     }
 }
 
-/// The one that says more.
+/// The more informative one.
 fn better(one: Measured, other: Measured) -> Measured {
     if other.finished || other.gap.width() < one.gap.width() {
         other
@@ -262,7 +262,7 @@ fn better(one: Measured, other: Measured) -> Measured {
 
 type Asked = (Vec<BodySlot>, Vec<Body>);
 
-/// A body and what hangs on it, where they are asked for.
+/// A body and those that hang on it, at the queried place.
 fn parts_of(
     world: &World,
     name: &str,
@@ -292,7 +292,7 @@ fn parts_of(
         let Some(other) = world.body(slot) else {
             continue;
         };
-        // A body that does not take part, or whose own shape is not known, is asked for by nobody.
+        // Bodies that are disabled, or whose own shape is not known, are left out.
         if other.status == BodyStatus::Disabled {
             continue;
         }
@@ -305,7 +305,7 @@ fn parts_of(
     Ok((slots, bodies))
 }
 
-/// No point of the one is nearer to any of the other than this, metres; 0 or less says nothing.
+/// A lower bound on the distance between any points of the two, metres; 0 or less proves nothing.
 fn bound_m(one: &Body, other: &Body) -> f64 {
     match (one.unbounded, other.unbounded) {
         (false, false) => one.proxy.distance(&other.proxy),
@@ -315,7 +315,7 @@ fn bound_m(one: &Body, other: &Body) -> f64 {
     }
 }
 
-/// How far above the half-spaces of the one the ball around the other is at least, metres; 0 where it has other shapes.
+/// A lower bound on the height of the ball around one above the other's half-spaces, metres; 0 if it has other shapes.
 fn above_m(planes: &Body, ball: &Body) -> f64 {
     let centre = ball.pose * ball.centre;
     let mut least_m = f64::INFINITY;

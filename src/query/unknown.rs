@@ -1,16 +1,16 @@
-//! Bodies whose place is not known, for an answer: named while there is room, then counted. In: bodies. Out: names and
-//! what is known of each.
+//! Bodies of unknown place in an answer: named while there is room, then counted. In: bodies. Out: names and what is
+//! known of each.
 
 use crate::limits::UNKNOWN_ROWS_MAX;
 use crate::wire::{BodyStatus, UnknownBody};
 use crate::world::Body;
 
-/// Where a body may be, for who asks around.
+/// Where a body may be, for a query of a region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Whereabouts {
-    /// Nowhere but within its box.
+    /// Only within its box.
     InItsBox,
-    /// There, and elsewhere, too: it is held at a pose of long ago.
+    /// There, and elsewhere too: it is held at an old pose.
     HeldThere,
     /// Nothing bounds its place.
     Anywhere,
@@ -27,7 +27,7 @@ impl Whereabouts {
     }
 }
 
-/// Those that were met.
+/// The bodies found so far.
 #[derive(Debug, Default)]
 pub(super) struct Unknown {
     named: Vec<UnknownBody>,
@@ -35,7 +35,7 @@ pub(super) struct Unknown {
 }
 
 impl Unknown {
-    /// Takes a body, unless its place is known.
+    /// Adds a body, unless its place is known.
     pub(super) fn note(&mut self, body: &Body) {
         if matches!(body.status, BodyStatus::Known | BodyStatus::Truncated) {
             return;
@@ -55,7 +55,7 @@ impl Unknown {
         self.named.is_empty()
     }
 
-    /// The names, and how many more there are.
+    /// The names, and the number of further bodies.
     pub(super) fn take(self) -> (Vec<UnknownBody>, u64) {
         (self.named, self.left_out)
     }

@@ -1,7 +1,7 @@
-//! From a spec to a built shape, with its warnings; and a library that shares equal ones.
+//! From a spec to a built shape, with its warnings.
 //!
-//! In: a checked or unchecked `ShapeSpec` and the folder its files are relative to. Out: an `Arc<Shape>`. Off the tick
-//! path: a large mesh takes seconds.
+//! In: a checked or unchecked `ShapeSpec` and the folder its files are relative to. Out: an `Arc<Shape>`. Not in a
+//! tick: a large mesh takes seconds.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,21 +9,21 @@ use std::sync::Arc;
 use crate::math::{Aabb, Point, Pose, Vec3};
 use crate::shape::{Convex, Geometry, Mesh, Shape, ShapeError, ShapeSpec, height_field, load};
 
-/// Sizes outside are worth a question: millimetres taken for metres are the most common mistake of all, metres.
+/// Sizes outside are worth a warning: millimetres taken for metres are the most common mistake of all, metres.
 const USUAL_SIZE_M: std::ops::RangeInclusive<f64> = 1e-3..=100.0;
 
-/// A built shape, and what is odd about it.
+/// A built shape, with warnings.
 #[derive(Clone, Debug)]
 pub struct Built {
     /// The shape, shared.
     pub shape: Arc<Shape>,
-    /// Things to know that did not stop it, each a sentence without the body's name.
+    /// Issues that did not stop it, each a sentence without the body's name.
     pub warnings: Vec<String>,
-    /// What was settled where the spec does not say it: nothing to change.
+    /// A decision where the spec leaves it open: nothing to change.
     pub note: Option<&'static str>,
 }
 
-/// Of a mesh of which the spec does not say whether it is one (law 3.3).
+/// Note for a mesh whose spec does not say whether it is a solid (law 3.3).
 const SOLID: &str = "solid, because it is closed and consistently oriented";
 
 /// Builds a shape.
@@ -33,12 +33,12 @@ const SOLID: &str = "solid, because it is closed and consistently oriented";
 /// Cost: files are read here; O(n log n) of the triangles.
 ///
 /// # Errors
-/// What cannot be built, and what to change; a panic of a hull builder comes as `ShapeError::Hull`.
+/// What cannot be built, and what to change; a panic of a hull builder becomes `ShapeError::Hull`.
 pub fn build(spec: &ShapeSpec, base: &Path) -> Result<Built, ShapeError> {
     build_by(spec, &mut |file| load::read(base, file))
 }
 
-/// Reads a mesh file of a name: its path, and its bytes.
+/// Reads a mesh file by name: returns its path and its bytes.
 pub(super) type Read<'a> = dyn FnMut(&str) -> Result<(PathBuf, Arc<[u8]>), ShapeError> + 'a;
 
 /// As [`build`], with files read by `read`.
@@ -133,7 +133,7 @@ fn convex(
     Ok(Shape::of_convex(convex.checked()?))
 }
 
-/// The hull of points; whatever a hull builder makes of odd input, a user's file must not end the daemon.
+/// The hull of points; whatever a hull builder does with odd input, a user's file must not end the daemon.
 fn hull(points: &[Point]) -> Result<Convex, ShapeError> {
     let built = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| Convex::hull(points)));
     built.unwrap_or_else(|_| {
@@ -161,7 +161,7 @@ fn mesh(
 
 fn half_space(normal: [f64; 3], offset: f64) -> Shape {
     let normal = Vec3::from(normal);
-    // Scaled by its largest part first, so that neither 1e-200 nor 1e200 loses the direction.
+    // Scaled by its largest component first, so that neither 1e-200 nor 1e200 loses the direction.
     let normal = (normal / normal.amax()).normalize();
     let (low, high) = (f64::NEG_INFINITY, f64::INFINITY);
     Shape {
@@ -179,9 +179,9 @@ fn points(vertices: &[[f64; 3]]) -> Vec<Point> {
     vertices.iter().map(|v| Point::from(*v)).collect()
 }
 
-/// Asks about a size that few mean.
+/// Warns of a size that is rarely meant.
 fn size_warning(shape: &Shape) -> Option<String> {
-    // The boxes are rounded outward; a size of exactly 1 mm or 100 m is not yet odd.
+    // The boxes are rounded outward; a size of exactly 1 mm or 100 m is still usual.
     let size = (shape.aabb.max - shape.aabb.min).amax();
     let slop = 1e-9 * size;
     if !size.is_finite() {

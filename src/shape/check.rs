@@ -1,13 +1,13 @@
-//! Checks of what a user wrote, before anything is built: numbers, extents, indices, contradicting settings.
+//! Checks of user input, before anything is built: numbers, extents, indices, contradicting settings.
 
 use crate::limits::{COORDINATE_MAX_M, EXTENT_MAX_M, EXTENT_MIN_M, TRIANGLES_MAX};
 use crate::shape::{ShapeError, ShapeSpec};
 
 impl ShapeSpec {
-    /// Checks the numbers of the spec; files are not looked at.
+    /// Checks the numbers of the spec; files are not read.
     ///
     /// # Errors
-    /// The first thing that cannot be built; texts start with the key they are about.
+    /// The first thing that cannot be built; texts start with the key they refer to.
     pub fn check(&self) -> Result<(), ShapeError> {
         match self {
             Self::Sphere { radius } => extent("radius", *radius),
@@ -83,7 +83,7 @@ impl ShapeSpec {
     }
 }
 
-/// Inline geometry or a file, never both, never none; a scale belongs to a file.
+/// Inline geometry or a file, exactly one of them; a scale needs a file.
 fn either(
     inline_is_empty: bool,
     file: Option<&str>,
@@ -128,7 +128,7 @@ pub(crate) fn finite(what: &str, value: f64) -> Result<(), ShapeError> {
     })
 }
 
-/// A size that can be computed with.
+/// A size within the allowed range.
 pub(super) fn extent(what: &str, value_m: f64) -> Result<(), ShapeError> {
     finite(what, value_m)?;
     if (EXTENT_MIN_M..=EXTENT_MAX_M).contains(&value_m) {
@@ -140,7 +140,7 @@ pub(super) fn extent(what: &str, value_m: f64) -> Result<(), ShapeError> {
     })
 }
 
-/// Points that are all in one place, or span what can be computed with.
+/// Points that all coincide, or have an allowed extent.
 pub(crate) fn spread<'a>(
     what: &str,
     vertices: impl Iterator<Item = &'a [f64; 3]>,
@@ -159,7 +159,7 @@ pub(crate) fn spread<'a>(
     }
 }
 
-/// Points that can be computed with.
+/// Points with allowed coordinates.
 pub(crate) fn points(vertices: &[[f64; 3]]) -> Result<(), ShapeError> {
     for (place, vertex) in vertices.iter().enumerate() {
         for value in vertex {
@@ -179,7 +179,7 @@ pub(crate) fn points(vertices: &[[f64; 3]]) -> Result<(), ShapeError> {
     Ok(())
 }
 
-/// Faces that name vertices which are there.
+/// Faces that name existing vertices.
 pub(crate) fn indices(vertices: usize, faces: &[[u32; 3]]) -> Result<(), ShapeError> {
     if faces.is_empty() || vertices == 0 {
         return Err(ShapeError::EmptyMesh);

@@ -1,9 +1,9 @@
-//! Shapes that deform: one of a mesh, for one body alone.
+//! Shapes that deform: a mesh for one body alone.
 
 use super::{Geometry, Mesh, NewTree, Shape, ShapeError};
 
 impl Shape {
-    /// The same shape as one whose vertices can be moved, of its own.
+    /// A copy of this shape whose vertices can be moved.
     ///
     /// # Errors
     /// It is no mesh, or one that cannot deform, and what to change.
@@ -28,25 +28,25 @@ impl Shape {
         self.mesh().is_some_and(Mesh::is_deforming)
     }
 
-    /// See [`Mesh::lag_m`]; 0 where nothing deforms.
+    /// See [`Mesh::lag_m`]; 0 if nothing deforms.
     #[inline]
     pub(crate) fn lag_m(&self) -> f64 {
         self.mesh().map_or(0.0, Mesh::lag_m)
     }
 
-    /// See [`Mesh::bent_m`]; 0 where nothing deforms.
+    /// See [`Mesh::bent_m`]; 0 if nothing deforms.
     #[inline]
     pub(crate) fn bent_m(&self) -> f64 {
         self.mesh().map_or(0.0, Mesh::bent_m)
     }
 
-    /// See [`Mesh::shed_m`]; 0 where nothing deforms.
+    /// See [`Mesh::shed_m`]; 0 if nothing deforms.
     #[inline]
     pub(crate) fn shed_m(&self) -> f64 {
         self.mesh().map_or(0.0, Mesh::shed_m)
     }
 
-    /// Another number means another tree.
+    /// A different number means a different tree.
     #[inline]
     pub(crate) fn tree_revision(&self) -> u32 {
         self.mesh().map_or(0, Mesh::tree_revision)
@@ -78,7 +78,7 @@ impl Shape {
         }
     }
 
-    /// The mesh that it is.
+    /// Its mesh, if it is one.
     #[inline]
     pub(crate) fn mesh(&self) -> Option<&Mesh> {
         match &self.geometry {

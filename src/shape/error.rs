@@ -1,5 +1,5 @@
-//! Why a shape cannot be built: what is wrong with it and what to change. Where it stands (file, line, body) is
-//! added by whoever read it.
+//! Why a shape cannot be built: what is wrong with it and what to change. Its location (file, line, body) is added by
+//! the caller.
 
 use std::path::Path;
 
@@ -29,7 +29,7 @@ pub enum ShapeError {
         /// The size, metres.
         value_m: f64,
     },
-    /// A hull needs four points that differ.
+    /// A hull needs four different points.
     #[error("the hull has {given} different points: give at least 4, not all in one plane")]
     TooFewPoints {
         /// How many different points there are.
@@ -43,7 +43,7 @@ pub enum ShapeError {
         /// Its least extent found, metres.
         thickness_m: f64,
     },
-    /// A hull has more corners than support functions can walk.
+    /// A hull has more corners than support functions can search.
     #[error(
         "the hull has {given} corners, more than {HULL_VERTICES_MAX}: simplify it, or use a trimesh"
     )]
@@ -59,10 +59,10 @@ pub enum ShapeError {
         /// What it said.
         message: String,
     },
-    /// A face names a vertex that is not there.
+    /// A face names a vertex that does not exist.
     #[error("face {face} names vertex {index}, but there are {vertices}: count vertices from 0")]
     IndexOutOfRange {
-        /// Place of the face, from 0.
+        /// Index of the face, from 0.
         face: usize,
         /// The index it names.
         index: u32,
@@ -98,17 +98,17 @@ pub enum ShapeError {
     /// A file that cannot be opened or read.
     #[error("{path}: {message}: check the path (it is relative to the scene file) and its rights")]
     Unreadable {
-        /// The file, as it was looked for.
+        /// The file, as it was searched for.
         path: String,
         /// What the system said.
         message: String,
     },
-    /// A file whose content is not what its format asks for.
+    /// A file whose content does not follow its format.
     #[error("{path}{}: {message}", .line.map_or(String::new(), |line| format!(":{line}")))]
     Format {
         /// The file.
         path: String,
-        /// Line, from 1, where the format has lines.
+        /// Line, from 1, if the format has lines.
         line: Option<usize>,
         /// What is wrong, and what to change.
         message: String,
@@ -124,7 +124,7 @@ pub enum ShapeError {
 }
 
 impl ShapeError {
-    /// The same, of the geometry of a file.
+    /// The same error, attributed to a file.
     pub(super) fn of_file(self, path: &Path) -> Self {
         Self::Content {
             path: path.display().to_string(),
@@ -133,7 +133,7 @@ impl ShapeError {
     }
 }
 
-/// Without hundreds of zeros.
+/// Formats without hundreds of zeros.
 fn metres(value: f64) -> String {
     if value == 0.0 || (1e-4..1e16).contains(&value.abs()) {
         value.to_string()

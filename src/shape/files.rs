@@ -1,6 +1,6 @@
-//! Where the contents of mesh files come from: the disk, or what was kept of them.
+//! The source of mesh file contents: the disk, or contents that were kept.
 //!
-//! In: a file's name, as a spec says it. Out: its path, for messages and its kind, and its bytes.
+//! In: a file's name, as written in a spec. Out: its path, for messages and its kind, and its bytes.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use std::time::SystemTime;
 
 use crate::shape::{ShapeError, load};
 
-/// Contents of mesh files by their names, as specs say them.
+/// Contents of mesh files by their names, as written in specs.
 pub type Contents = BTreeMap<String, Arc<[u8]>>;
 
 /// Where mesh files are read.
@@ -18,17 +18,17 @@ pub(super) enum Files {
     /// On disk.
     #[default]
     Disk,
-    /// On disk; what was read is kept until it is taken, so that the same shapes can be built elsewhere.
+    /// On disk; contents are kept until they are taken, so that the same shapes can be built elsewhere.
     Keeping {
         kept: Contents,
-        /// The file of each name as it was last kept.
+        /// The file behind each name when it was last kept.
         marks: BTreeMap<String, FileMark>,
     },
-    /// Among these contents alone.
+    /// Only these contents.
     Kept(Contents),
 }
 
-/// Which file it is, and in which state.
+/// Identifies a file and its state.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct FileMark {
     path: PathBuf,
@@ -37,7 +37,7 @@ pub(super) struct FileMark {
 }
 
 impl Files {
-    /// What tells a file from one that was read before.
+    /// The mark that distinguishes a file from one read before.
     pub(super) fn mark(&self, base: &Path, file: &str) -> Result<FileMark, ShapeError> {
         if let Self::Kept(contents) = self {
             let bytes = find(contents, file)?;
@@ -56,7 +56,7 @@ impl Files {
         })
     }
 
-    /// Whether a shape that was built of this file needs not be built again: who is told of what was read knows it.
+    /// Whether a shape built from this file may be reused: while contents are kept, only if this very file was kept.
     pub(super) fn knows(&self, file: &str, mark: &FileMark) -> bool {
         match self {
             Self::Keeping { marks, .. } => marks.get(file) == Some(mark),

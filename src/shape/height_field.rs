@@ -1,11 +1,11 @@
 //! Height fields as closed meshes: the top surface, four side walls, and a floor below the least sample.
 //!
-//! In: a grid of samples, already checked. Out: vertices and faces; the faces of the top surface come first, two a
-//! cell, row by row, so that a triangle's number tells its cell.
+//! In: a grid of checked samples. Out: vertices and faces; the faces of the top surface come first, two a cell, row by
+//! row, so that a triangle's index gives its cell.
 
 use crate::math::Point;
 
-/// How many triangles the mesh of a grid has.
+/// Number of triangles in the mesh of a grid.
 pub(crate) fn triangles(rows: usize, columns: usize) -> u64 {
     let (rows, columns) = (rows.max(2) as u64, columns.max(2) as u64);
     let edges = boundary_len(rows, columns);
@@ -21,7 +21,7 @@ fn boundary_len(rows: u64, columns: u64) -> u64 {
 
 /// Vertices and outward faces of the solid under a grid, its own frame, metres.
 ///
-/// Each cell is cut from its lower-left to its upper-right sample, as MuJoCo does. The floor is a fan about its middle
+/// Each cell is cut from its lower-left to its upper-right sample, as in MuJoCo. The floor is a fan about its middle
 /// that shares the walls' corners, so that no corner lies on another's edge and the mesh is closed.
 ///
 /// * `heights` - `[rows][columns]`, at least 2 by 2, rows along +y, columns along +x.
@@ -56,7 +56,7 @@ pub(crate) fn mesh(
         }
     }
 
-    // Once round the rim, counter-clockwise seen from above.
+    // Once around the rim, counter-clockwise seen from above.
     let south = (0..columns - 1).map(|column| sample(0, column));
     let east = (0..rows - 1).map(|row| sample(row, columns - 1));
     let north = (1..columns).rev().map(|column| sample(rows - 1, column));
@@ -79,7 +79,7 @@ pub(crate) fn mesh(
     (points, faces)
 }
 
-/// Place of sample `k` of `count` along a side of `length_m`; the ends are exact.
+/// Position of sample `k` of `count` along a side of `length_m`; the ends are exact.
 fn place(k: usize, count: usize, length_m: f64) -> f64 {
     #[allow(
         clippy::cast_precision_loss,

@@ -8,17 +8,17 @@ use crate::shape::build::build_by;
 use crate::shape::files::{Contents, FileMark, Files};
 use crate::shape::{Built, ShapeError, ShapeSpec};
 
-/// Shapes built so far, found by what was said of them.
+/// Shapes built so far, looked up by their specs.
 ///
 /// A mesh file is read again when its size or time has changed.
 #[derive(Debug, Default)]
 pub struct Library {
-    /// Never held while a shape is built.
+    /// Never locked while a shape is built.
     shelves: Arc<Mutex<Shelves>>,
     files: Files,
 }
 
-/// By digest; several entries of one digest are told apart by their specs.
+/// By digest; entries with the same digest are distinguished by their specs.
 type Shelves = BTreeMap<u64, Vec<Entry>>;
 
 #[derive(Debug)]
@@ -29,13 +29,13 @@ struct Entry {
 }
 
 impl Library {
-    /// Nothing is built yet.
+    /// An empty library.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Nothing is built yet; the contents of files that are read are kept until [`Library::take_kept`].
+    /// An empty library; the contents of files that it reads are kept until [`Library::take_kept`].
     #[must_use]
     pub fn keeping() -> Self {
         Self {
@@ -47,7 +47,7 @@ impl Library {
         }
     }
 
-    /// Nothing is built yet; files are those that [`Library::take_kept`] yielded elsewhere, and no other is looked at.
+    /// An empty library; its files are those that [`Library::take_kept`] returned elsewhere, and no others.
     #[must_use]
     pub fn of_kept(contents: Contents) -> Self {
         Self {
@@ -56,7 +56,7 @@ impl Library {
         }
     }
 
-    /// Another one of the same shapes, for another thread; what it reads is not kept.
+    /// A second library of the same shapes, for another thread; what it reads is not kept.
     #[must_use]
     pub fn beside(&self) -> Self {
         Self {
@@ -69,7 +69,7 @@ impl Library {
         self.shelves.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Files that were read since the last call, where they are kept.
+    /// Files read since the last call, if they are kept.
     pub fn take_kept(&mut self) -> Contents {
         match &mut self.files {
             Files::Keeping { kept, .. } => std::mem::take(kept),
@@ -77,7 +77,7 @@ impl Library {
         }
     }
 
-    /// Adds to the contents of a library that is of kept files; shapes of what a name stood for before are forgotten.
+    /// Adds contents to a library of kept files; shapes built from a name's old contents are forgotten.
     pub fn add_kept(&mut self, contents: Contents) {
         let Files::Kept(all) = &mut self.files else {
             return;
@@ -116,7 +116,7 @@ impl Library {
         Ok(built)
     }
 
-    /// Forgets shapes that nobody else holds; to be called after bodies were removed.
+    /// Forgets shapes that are not used elsewhere; to be called after bodies were removed.
     pub fn prune(&mut self) {
         self.shelves().retain(|_, shelf| {
             shelf.retain(|entry| Arc::strong_count(&entry.built.shape) > 1);
@@ -124,7 +124,7 @@ impl Library {
         });
     }
 
-    /// How many different shapes it holds.
+    /// Number of different shapes.
     #[must_use]
     pub fn len(&self) -> usize {
         self.shelves().values().map(Vec::len).sum()

@@ -42,7 +42,7 @@ use crate::limits::{EXTENT_MAX_M, EXTENT_MIN_M, TRIANGLES_MAX};
 use crate::math::{Aabb, Point, Pose, ROUND, Vec3};
 use crate::shape::ShapeError;
 
-/// Above this many vertices a table of directions gives the box at a pose.
+/// With more vertices than this a table of directions gives the box at a pose.
 const OUTLINE_VERTICES_MIN: usize = 24;
 
 /// Triangles in their own frame: a solid when they are closed and face consistently, else a surface.
@@ -55,23 +55,23 @@ pub struct Mesh {
     warnings: Vec<String>,
     tree: Tree,
     /// Oriented boxes, for pairs of surfaces; the other tree serves rays, planes and extents, where its boxes are as
-    /// good and a quarter of the size.
+    /// good at a quarter of the size.
     obb: ObbTree,
-    /// Apart, so that a shape that is no mesh is not large for it.
+    /// Boxed, so that it does not enlarge shapes that are no meshes.
     adjacency: Box<Adjacency>,
-    /// The neighbours of each vertex; apart as well.
+    /// The neighbours of each vertex; boxed as well.
     rings: Box<Rings>,
-    /// Which way the faces under each oriented box look; apart as well.
+    /// The normals of the faces under each oriented box; boxed as well.
     normals: Box<Normals>,
-    /// Balls within it; none of a surface, or of a mesh that deforms.
+    /// Inner balls; none for a surface, or a mesh that deforms.
     balls: Option<Box<Balls>>,
-    /// None for a small mesh, whose vertices are walked.
+    /// None for a small mesh, whose vertices are iterated.
     outline: Option<Outline>,
-    /// Its box; of one that deforms it holds the vertices that no face names, too.
+    /// Its box; for one that deforms it also contains the vertices that no face names.
     bounds: Aabb,
     centre: Point,
     radius: f64,
-    /// None for a rigid mesh. Then there is neither a tree beside `obb` nor an outline.
+    /// None for a rigid mesh. If there is one, `obb` is the only tree and there is no outline.
     deform: Option<Box<Deform>>,
 }
 
@@ -79,17 +79,17 @@ impl Mesh {
     /// Builds a mesh.
     ///
     /// * `vertices` - own frame, metres.
-    /// * `faces` - places in `vertices`, counter-clockwise seen from outside.
-    /// * `solid` - whether the inside belongs to it; `None`: when it is closed and consistently oriented.
+    /// * `faces` - indices into `vertices`, counter-clockwise seen from outside.
+    /// * `solid` - whether the inside belongs to it; `None`: if it is closed and consistently oriented.
     ///
-    /// A solid's shell of negative volume that is not wholly within another is turned round with all it holds, and a
-    /// warning says so. Faces keep their places; turned ones swap their last two corners.
+    /// A solid's shell of negative volume that is not wholly within another is turned round with all it contains, and a
+    /// warning says so. Faces keep their indices; turned ones swap their last two corners.
     ///
     /// Cost: O(n log n); inside tests for shells of negative volume.
     ///
     /// # Errors
     /// Numbers that are not finite, indices out of range, no face with an area, an extent out of range, too many
-    /// triangles, or `solid` said of a mesh that cannot bound a solid.
+    /// triangles, or `solid` set for a mesh that cannot bound a solid.
     pub fn new(
         vertices: Vec<Point>,
         mut faces: Vec<[u32; 3]>,
@@ -128,7 +128,7 @@ impl Mesh {
         if solid {
             mesh.turn_shells(&topology);
         }
-        // Turned faces have their sides in another order.
+        // Turned faces have their sides in a different order.
         mesh.adjacency = Box::new(Adjacency::new(&topology, &mesh));
         mesh.rings = Box::new(Rings::new(&mesh));
         mesh.normals = Box::new(Normals::new(&mesh));
@@ -143,7 +143,7 @@ impl Mesh {
         &self.vertices
     }
 
-    /// Its faces as places in [`Mesh::vertices`], counter-clockwise seen from outside.
+    /// Its faces as indices into [`Mesh::vertices`], counter-clockwise seen from outside.
     #[must_use]
     pub fn faces(&self) -> &[[u32; 3]] {
         &self.faces
@@ -162,13 +162,13 @@ impl Mesh {
         self.solid
     }
 
-    /// What `check` says of it: whether it is a solid and why, and what is odd about it.
+    /// What `check` reports of it: whether it is a solid and why, and any oddities.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// One vertex, by its place, of every set of faces that hang together.
+    /// One vertex, by its index, of every connected set of faces.
     #[must_use]
     pub fn shells(&self) -> &[u32] {
         &self.shells
@@ -196,12 +196,12 @@ impl Mesh {
     ///
     /// Exact for a small mesh; of a large one up to 0.4 % larger than tight, exact along its own axes.
     ///
-    /// Cost: some 100 ns, whatever the number of triangles.
+    /// Cost: some 100 ns, regardless of the number of triangles.
     #[must_use]
     pub fn aabb_at(&self, pose: &Pose) -> Aabb {
         let rotation = pose.rotation.to_rotation_matrix();
         let centre = pose * self.centre;
-        // Roundings of the rotation, the products and the sum, each a few units of what they work on.
+        // Rounding of the rotation, the products and the sum, each a few units of their operands.
         let slop = 16.0 * ROUND * (centre.coords.amax() + self.centre.coords.amax() + self.radius);
         let mut bounds = Aabb::empty();
         for k in 0..3 {
@@ -213,7 +213,7 @@ impl Mesh {
         bounds.widened(slop)
     }
 
-    /// An upper bound, but for rounding, on how far it reaches from its centre along a unit direction.
+    /// An upper bound, up to rounding, on how far it reaches from its centre along a unit direction.
     pub(crate) fn reach(&self, direction: &Vec3) -> f64 {
         match &self.outline {
             // No direction reaches beyond the ball.
@@ -222,7 +222,7 @@ impl Mesh {
         }
     }
 
-    /// Upper bounds, but for rounding, on how far it reaches from its centre along a unit direction and against it.
+    /// Upper bounds, up to rounding, on how far it reaches from its centre along a unit direction and against it.
     pub(crate) fn extent(&self, direction: &Vec3) -> [f64; 2] {
         if self.is_deforming() {
             return self.extent_of_bounds(direction);
@@ -237,7 +237,7 @@ impl Mesh {
         [*direction, -direction].map(|along| self.reach(&along))
     }
 
-    /// A vertex far along `direction`: a guess, but a vertex of a face in any case.
+    /// A vertex far along `direction`: not always the farthest, but a vertex of a face in any case.
     ///
     /// Cost: one path down the tree.
     pub(crate) fn outlying(&self, direction: &Vec3) -> Point {
@@ -264,7 +264,7 @@ impl Mesh {
         }
     }
 
-    /// The tree over the triangles of a rigid mesh, for the twin of the fronts; see [`Mesh::node`].
+    /// The tree over the triangles of a rigid mesh, for the fronts' reference; see [`Mesh::node`].
     pub(crate) fn tree(&self) -> &Tree {
         &self.tree
     }
@@ -275,7 +275,7 @@ impl Mesh {
     }
 }
 
-/// Refuses what cannot be computed with, and yields the box of all that faces name.
+/// Refuses values that cannot be computed with, and returns the box of all vertices that faces name.
 fn check(vertices: &[Point], faces: &[[u32; 3]]) -> Result<Aabb, ShapeError> {
     if faces.len() > TRIANGLES_MAX {
         return Err(ShapeError::TooManyTriangles {
@@ -324,7 +324,7 @@ fn check(vertices: &[Point], faces: &[[u32; 3]]) -> Result<Aabb, ShapeError> {
     Ok(bounds)
 }
 
-/// Decides whether the mesh is a solid, and says why; turns faces of a solid that do not agree.
+/// Decides whether the mesh is a solid, and why; turns faces of a solid that do not agree.
 fn settle(
     topology: &mut Topology,
     vertices: &[Point],

@@ -1,4 +1,4 @@
-//! Shapes: what a user says (`ShapeSpec`), what the engine queries (`Shape`), and the loaders between them.
+//! Shapes: what a user writes (`ShapeSpec`), what the engine queries (`Shape`), and the loaders between them.
 //!
 //! In: a spec and the folder its files are relative to. Out: an immutable, shared `Shape` with its bounds.
 
@@ -46,7 +46,7 @@ pub struct Shape {
     pub radius: f64,
 }
 
-/// The kinds of geometry that the narrow phase tells apart.
+/// The kinds of geometry that the narrow phase distinguishes.
 #[derive(Clone, Debug)]
 pub enum Geometry {
     /// A convex solid, or a triangle.
@@ -63,7 +63,7 @@ pub enum Geometry {
 }
 
 impl Shape {
-    /// Of a convex solid or a triangle, whatever its sizes are: a segment or a point, too.
+    /// For a convex solid or a triangle, of any sizes: also a segment or a point.
     pub(crate) fn of_convex(convex: Convex) -> Self {
         Self {
             aabb: convex.aabb_at(&Pose::identity()),
@@ -83,9 +83,9 @@ impl Shape {
         }
     }
 
-    /// Whether two shapes of equal specs are equal: where these name a file, it may have changed.
+    /// Whether two shapes of equal specs are equal: a file that both name may have changed.
     ///
-    /// * `deforms` - then where its vertices are says nothing, as its sender moves them.
+    /// * `deforms` - then vertex positions do not count, as the sender moves them.
     pub(crate) fn is_built_alike(&self, other: &Self, deforms: bool) -> bool {
         match (&self.geometry, &other.geometry) {
             (Geometry::Convex(a), Geometry::Convex(b)) => a.vertices() == b.vertices(),

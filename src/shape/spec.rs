@@ -1,4 +1,4 @@
-//! What a shape is said to be: the serde type of scene files, edit requests and batch queries.
+//! The specification of a shape: the serde type of scene files, edit requests and batch queries.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +16,7 @@ pub enum ShapeSpec {
         /// Half of each side, metres, > 0.
         half_extents: [f64; 3],
     },
-    /// A segment along z, blown up.
+    /// A segment along z with a ball rolled around it.
     Capsule {
         /// Metres, > 0.
         radius: f64,
@@ -59,7 +59,7 @@ pub enum ShapeSpec {
         /// `[n]` corners.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         vertices: Vec<[f64; 3]>,
-        /// `[m]` triples of places in `vertices`, counter-clockwise seen from outside.
+        /// `[m]` triples of indices into `vertices`, counter-clockwise seen from outside.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         faces: Vec<[u32; 3]>,
         /// STL, OBJ or DAE; relative to the scene file.
@@ -92,7 +92,7 @@ pub enum ShapeSpec {
 }
 
 impl ShapeSpec {
-    /// The mesh file that it names, as it says it.
+    /// The mesh file that it names, as written.
     #[must_use]
     pub fn file(&self) -> Option<&str> {
         match self {
@@ -101,7 +101,7 @@ impl ShapeSpec {
         }
     }
 
-    /// How many vertices, faces and samples it brings along; a file may hold any number.
+    /// Number of vertices, faces and samples it contains; a file may hold any number.
     #[must_use]
     pub fn size(&self) -> usize {
         match self {

@@ -1,23 +1,23 @@
-//! Eight boxes along the axes, from two corners of each to what a pack of them stores: centres and half sides.
+//! Eight axis-aligned boxes, from two corners of each to the form stored in a pack: centres and half sides.
 //!
-//! In: corners by rows, as they are found one after the other. Out: a pack's columns, how far its boxes reach, and
-//! their surface. Turning rows into columns is what takes the time: left to the compiler, it takes more than all else
-//! in a refit of a mesh.
+//! In: corners by rows, in the order they are found. Out: a pack's columns, the reach of its boxes, and their surface.
+//! Transposing rows into columns takes the time: left to the compiler, it takes more than everything else in a refit of
+//! a mesh.
 
 use super::greater;
 use super::obb::{LANES, Pack};
 
-/// Centres and half sides are sums and differences of f32, each off by half an ulp at most: four are added.
+/// Centres and half sides are sums and differences of f32, each off by half an ulp at most: four ulps are added.
 const GROW: f32 = 1.0 + 4.0 * f32::EPSILON;
 
-/// What every half side has more, metres. Its square is still a normal number: with smaller ones a product in
-/// [`set`] takes some hundred cycles.
+/// Added to every half side, metres. Its square is still a normal number: with smaller ones a product in [`set`] takes
+/// some hundred cycles.
 const LEAST: f32 = 1e-18;
 
 /// A point of a frame, metres; the last number is padding.
 pub type Row = [f32; 4];
 
-/// Sets centres and half sides of a pack to those of eight boxes; axes stay as they are.
+/// Sets centres and half sides of a pack to those of eight boxes; axes are unchanged.
 ///
 /// * `low`, `high` - the corners of each, metres, finite.
 /// * `surface` - an eighth of each box's surface is added to its lane, m2.
@@ -41,7 +41,7 @@ pub fn set(
     scalar(pack, low, high, surface)
 }
 
-/// The twin of [`set`] without vector instructions.
+/// [`set`] without vector instructions.
 fn scalar(
     pack: &mut Pack,
     low: &[Row; LANES],
@@ -161,7 +161,7 @@ mod tests {
     fn the_kernel_and_its_twin_agree_bit_for_bit() {
         let mut next = numbers(7);
         for round in 0..if cfg!(miri) { 10 } else { 2_000 } {
-            // Up to what a body may reach to, and down to sides whose squares are no normal numbers.
+            // Up to the largest reach of a body, and down to sides whose squares are subnormal.
             let exponent = if round % 2 == 0 {
                 9.0 * next()
             } else {
@@ -174,7 +174,7 @@ mod tests {
             for lane in 0..LANES - round % 3 {
                 for k in 0..3 {
                     low[lane][k] = scale * next();
-                    // Some boxes without a thickness, and some hardly thicker.
+                    // Some boxes without thickness, and some barely thicker.
                     let side = match (round + lane + k) % 7 {
                         0 => 0.0,
                         1 => 1e-7 * next().abs(),

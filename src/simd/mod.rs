@@ -1,22 +1,22 @@
-//! Kernels that work on many numbers at once, each beside a scalar twin of equal bits.
+//! Kernels that work on many numbers at once, each with a scalar twin of equal bits.
 //!
-//! The one room where `unsafe` is lifted, each block with what it relies on: calls of code that is compiled for more
-//! than the least of its processor family, inside it loads and stores of whole registers, and instructions by name
-//! (`boxes/x86.rs`, `aligned.rs`, `words.rs`). No kernel multiplies and adds in one rounding, so the same bits come out
-//! on every machine.
+//! The only room where `unsafe` is allowed, each block with what it relies on: calls of code that is compiled for more
+//! than the baseline of its processor family, inside it loads and stores of whole registers, and instructions by name
+//! (`boxes/x86.rs`, `aligned.rs`, `words.rs`). No kernel fuses multiply and add, so the same bits come out on every
+//! machine.
 
 pub mod aligned;
 pub mod boxes;
 pub mod obb;
 pub(crate) mod words;
 
-/// Asks the processor which instructions it has, as the first kernel would: in a virtual machine the first question
-/// takes 0.1 ms, which is better not spent in a tick.
+/// Queries the processor's features, as the first kernel would: in a virtual machine the first query takes 0.1 ms,
+/// which must not be spent in a tick.
 pub fn prepare() {
     let _best = boxes::Level::best();
 }
 
-/// The greater of two; of a number that is none and another: the other. One instruction.
+/// The greater of two; of a NaN and a number: the second. One instruction.
 #[inline(always)]
 fn greater(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }

@@ -1,28 +1,28 @@
 //! One oriented box against eight: a signed separation for each.
 //!
 //! In: eight boxes in columns (a [`Pack`]) and one box seen from their frame. Out: for each of the eight the greatest
-//! separation along the 15 axes of Gottschalk, Lin, Manocha 1996 (OBBTree), before rounding is taken off.
+//! separation along the 15 axes of Gottschalk, Lin, Manocha 1996 (OBBTree), before rounding is subtracted.
 //!
-//! Positive: nothing in the one is nearer to anything in the other, but for rounding. Along the face axes of one box
-//! the separations are at right angles and add up as squares. The edge axes are not normalised: their length is at most
-//! 1, so a positive separation along one is too small at worst. Zero or less: the boxes may touch, and the number only
-//! says by how much, for an order.
+//! Positive: a lower bound on the distance of their contents, up to rounding. Along the face axes of one box the
+//! separations are orthogonal and add up as squares. The edge axes are not normalised: their length is at most 1, so a
+//! positive separation along one is too small at worst. Zero or less: the boxes may touch, and the number is only
+//! useful as an order.
 
 use super::greater;
 
 /// Boxes in a pack.
 pub const LANES: usize = 8;
 
-/// Bound on the rounding of [`gaps`], as a share of what it works on: `|centre|` of the one (sum of coordinates), its
-/// half sides, and the pack's reach. A third more than the 51 units of roundoff (2^-24) that the worst chain of
-/// operations adds up to, axes and centre rounded to f32 included.
+/// Bound on the rounding of [`gaps`], as a share of its operands: `|centre|` of the one (sum of coordinates), its half
+/// sides, and the pack's reach. A third more than the 51 units of roundoff (2^-24) that the worst chain of operations
+/// adds up to, including axes and centre rounded to f32.
 pub const GAP_ROUND: f64 = 4e-6;
 
-/// A number of each lane.
+/// A number for each lane.
 type Lanes = [f32; LANES];
 
 /// Eight boxes in columns. A box is where `|axis . (x - centre)| <= half` for its three axes, with the stored f32
-/// numbers taken as exact; axes are unit and at right angles but for their rounding.
+/// numbers taken as exact; axes are unit and orthogonal up to rounding.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct Pack {
@@ -54,7 +54,7 @@ impl Pack {
     };
 }
 
-/// The separation of `one` and each box of `pack`, metres, to be lowered by [`GAP_ROUND`] times what it works on.
+/// The separation of `one` and each box of `pack`, metres, to be reduced by [`GAP_ROUND`] times its operands.
 #[must_use]
 pub fn gaps(one: &One, pack: &Pack) -> [f32; LANES] {
     #[cfg(target_arch = "x86_64")]
@@ -69,16 +69,16 @@ pub fn gaps(one: &One, pack: &Pack) -> [f32; LANES] {
     lanes(one, pack)
 }
 
-/// [`lanes`], compiled for eight numbers a register.
+/// [`lanes`], compiled for registers of eight numbers.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn gaps_avx2(one: &One, pack: &Pack) -> [f32; LANES] {
     lanes(one, pack)
 }
 
-/// Eight numbers that go through every operation side by side.
+/// Eight numbers that go through every operation in parallel.
 ///
-/// Plain loops over indices: closures handed to `array::map` are not inlined into a function compiled for more than the
+/// Plain loops over indices: closures passed to `array::map` are not inlined into a function compiled for more than the
 /// rest, and cost ten times as much (measured).
 #[derive(Clone, Copy)]
 struct Wide(Lanes);
@@ -113,7 +113,7 @@ impl Wide {
         self
     }
 
-    /// `other` where this is positive, else this.
+    /// `other` where this is positive, otherwise this.
     #[inline(always)]
     fn or_where_positive(mut self, other: Self) -> Self {
         for (x, y) in self.0.iter_mut().zip(&other.0) {
@@ -180,7 +180,7 @@ fn lanes(one: &One, pack: &Pack) -> [f32; LANES] {
     let (to, from) = (column(&pack.centre), spread(one.centre));
     let between = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
 
-    // Cosines between the axes of the two, and the way between the centres along each.
+    // Cosines between the axes of the two, and the vector between the centres along each.
     let (mut cosine, mut abs) = ([[zero; 3]; 3], [[zero; 3]; 3]);
     let (mut along_a, mut along_b) = ([zero; 3], [zero; 3]);
     for i in 0..3 {
@@ -204,7 +204,7 @@ fn lanes(one: &One, pack: &Pack) -> [f32; LANES] {
         square_a = square_a + over_a * over_a;
         square_b = square_b + over_b * over_b;
     }
-    // Where a face parts them the distance is at least each single separation but for rounding.
+    // If a face separates them, the distance is at least each single separation, up to rounding.
     let distance = square_a.max(square_b).sqrt();
     let mut best = most.or_where_positive(distance);
     for i in 0..3 {
@@ -220,7 +220,7 @@ fn lanes(one: &One, pack: &Pack) -> [f32; LANES] {
     best.0
 }
 
-/// The twin: one lane after the other, in plain numbers. Equal to [`gaps`] bit for bit.
+/// The twin: one lane after the other, in scalar code. Equal to [`gaps`] bit for bit.
 #[must_use]
 pub fn gaps_scalar(one: &One, pack: &Pack) -> [f32; LANES] {
     std::array::from_fn(|lane| {

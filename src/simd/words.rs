@@ -1,7 +1,7 @@
-//! Which of eight words are one.
+//! Which of eight words equal a given one.
 //!
-//! In: eight words and one. Out: a bit for each that equals it. What the compiler makes of the twin takes three times
-//! as long: it turns some compares into vectors and leaves others.
+//! In: eight words and one. Out: a bit for each that equals it. Compiled from the twin it takes three times as long:
+//! the compiler vectorises some compares and leaves others.
 
 #![allow(
     unsafe_code,
@@ -11,7 +11,7 @@
 /// Words that are compared at once.
 pub(crate) const WORDS: usize = 8;
 
-/// The places of those that equal `one`, as bits.
+/// The indices of those that equal `one`, as bits.
 #[inline(always)]
 pub(crate) fn same(words: &[u32; WORDS], one: u32) -> u32 {
     #[cfg(target_arch = "x86_64")]
@@ -31,7 +31,7 @@ fn plain(words: &[u32; WORDS], one: u32) -> u32 {
     equal.fold(0, |bits, (at, word)| bits | u32::from(*word == one) << at)
 }
 
-/// By SSE2, which every x86-64 has: what is safe to call everywhere there.
+/// By SSE2, which every x86-64 has: safe to call everywhere there.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn x86(words: &[u32; WORDS], one: u32) -> u32 {
@@ -45,7 +45,7 @@ fn x86(words: &[u32; WORDS], one: u32) -> u32 {
         let one = _mm_set1_epi32(one.cast_signed());
         let low = _mm_cmpeq_epi32(_mm_setr_epi32(a, b, c, d), one);
         let high = _mm_cmpeq_epi32(_mm_setr_epi32(e, f, g, h), one);
-        // Packing keeps all ones as all ones.
+        // Packing preserves all ones.
         let halves = _mm_packs_epi32(low, high);
         _mm_movemask_epi8(_mm_packs_epi16(halves, _mm_setzero_si128()))
     };

@@ -1,4 +1,4 @@
-//! The spots of a body pair: shape pair by shape pair, from fronts, trees, boxes and contacts that were found.
+//! The spots of a body pair, shape pair by shape pair: from fronts, trees, boxes and known contacts.
 
 use crate::ids::PairSlot;
 use crate::limits::REGION_SHAPE_PAIRS_MAX;
@@ -16,10 +16,10 @@ use super::pace::Pace;
 use super::spot::Spot;
 use super::{Approx, FOUND_MAX, Standing, boxes};
 
-/// Spots smaller than this share of the smaller body's radius are not split: they are no larger than what a sphere
-/// round a few of them is too large by.
+/// Spots smaller than this share of the smaller body's radius are not split: that is no more than a sphere around a few
+/// of them is too large by.
 const ENOUGH: f64 = 0.02;
-/// Looks at boxes that are above the shapes, for each pair of shapes that may be looked at.
+/// Looks at boxes above the shapes, for each pair of shapes that may be read.
 const LOOKS_PER_SHAPE_PAIR: usize = 4;
 
 /// A pair of shapes at this tick's poses.
@@ -28,9 +28,9 @@ struct Pair<'a> {
     other: &'a PlacedShape,
     /// Of the second seen from the first.
     pos12: Pose,
-    /// What rounding of the bodies' poses can be, metres.
+    /// Bound on the rounding of the bodies' poses, metres.
     slop_m: f64,
-    /// Its contacts are known, and are all.
+    /// Its contacts are known and complete.
     complete: bool,
 }
 
@@ -72,7 +72,7 @@ impl Narrow {
         }
     }
 
-    /// The front of a pair of shapes by their places; one that was never started knows nothing.
+    /// The front of a pair of shapes by their places, if it was ever started.
     fn front_at(&self, slot: PairSlot, places: (u32, u32)) -> Option<&CarriedFront> {
         let memo = self.memos.get(slot.index())?;
         if let Some(compound) = self.compounds.get(memo.compound) {
@@ -103,7 +103,7 @@ impl Narrow {
                     self.take_surfaces(pair, &scan, front, size_m, pace, approx);
                 }
             }
-            // Their contacts are all there is.
+            // Its contacts are all there is.
             _ if pair.complete => {}
             _ => {
                 if let Some(spot) = pair.convex() {
@@ -161,7 +161,7 @@ impl Narrow {
             pair.flush(scan, approx);
             return;
         }
-        // The largest first, while tests last.
+        // The largest first, as long as tests are allowed.
         let enough_m = ENOUGH * size_m;
         let Approx { raw, heap, .. } = approx;
         heap.clear();
@@ -185,7 +185,7 @@ impl Narrow {
     }
 }
 
-/// Lists the pairs of shapes whose boxes and balls may touch; false: there are too many, or no more looks.
+/// Lists the pairs of shapes whose boxes and balls may touch; false: there are too many, or no looks are left.
 fn find_near(
     (a, b): (&Body, &Body),
     rel: &Pose,
@@ -214,7 +214,7 @@ fn find_near(
 }
 
 impl Pair<'_> {
-    /// Takes the spots at hand in, with their normals.
+    /// Adds the current spots, with their normals.
     fn flush(&self, scan: &Scan<'_>, approx: &mut Approx) {
         for at in 0..approx.raw.len() {
             let spot = approx.raw[at];
@@ -224,12 +224,12 @@ impl Pair<'_> {
         approx.raw.clear();
     }
 
-    /// Takes a spot of the first shape's frame in.
+    /// Adds a spot given in the first shape's frame.
     fn put(&self, spot: Spot, approx: &mut Approx) {
         push(&mut approx.all, self.place(spot));
     }
 
-    /// A spot of the first shape's frame in A's body frame.
+    /// A spot in the first shape's frame, in A's body frame.
     fn place(&self, spot: Spot) -> Spot {
         let pose = &self.one.pose;
         let turn = pose.rotation.to_rotation_matrix();
@@ -265,7 +265,7 @@ impl Pair<'_> {
         }
     }
 
-    /// What of a mesh lies behind a plane.
+    /// The part of a mesh behind a plane.
     fn take_plane(
         &self,
         mesh: &Mesh,
@@ -282,7 +282,7 @@ impl Pair<'_> {
         let (down, offset) = plane_at(&mesh_from_plane, &normal, offset);
         let to_one = mesh_from_one.inverse();
         let turn = to_one.rotation.to_rotation_matrix();
-        // From A to B: into the mesh where the half-space is A.
+        // From A to B: into the mesh if the half-space is A.
         let out = if is_b { -down } else { down };
         let mut heap = std::mem::take(&mut approx.heap);
         PlaneScan::new(mesh, down, offset, self.slop_m).spots(
@@ -308,13 +308,13 @@ fn found(contact: &Contact, rel: &Pose) -> Spot {
     Spot::found(&contact.point_a, &b, contact.normal, -contact.gap_m)
 }
 
-/// The plane `normal . x = offset` of a frame that stands at `pose`, seen from where `pose` is told.
+/// The plane `normal . x = offset` of a frame at `pose`, in the frame that `pose` refers to.
 fn plane_at(pose: &Pose, normal: &Vec3, offset: f64) -> (Vec3, f64) {
     let turned = pose.rotation * normal;
     (turned, offset + turned.dot(&pose.translation.vector))
 }
 
-/// Greatest distance of a shape's point from its body's origin, metres; of a half-space that of its frame.
+/// Greatest distance of a shape's points from its body's origin, metres; for a half-space, of its frame.
 fn reach(placed: &PlacedShape) -> f64 {
     let shape: &Shape = &placed.shape;
     let own = if shape.radius.is_finite() {

@@ -1,24 +1,24 @@
-//! Few spheres round many spots.
+//! Encloses many spots in few spheres.
 //!
-//! In: spots, at most [`SPOTS_MAX`]. Out: them in at most [`REGIONS_MAX`] groups, each with a sphere. The largest group
-//! is parted in two until there are enough: by which of two spots far from each other is nearer.
+//! In: spots, at most [`SPOTS_MAX`]. Out: the spots in at most [`REGIONS_MAX`] groups, each with a sphere. The largest
+//! group is split in two until there are enough: each spot joins the nearer of two spots far from each other.
 //!
-//! Refused: greedy merging by least growth (the square of the spots, and no smaller spheres).
+//! Refused: greedy merging by least growth (quadratic in the spots, and no smaller spheres).
 
 use crate::limits::REGIONS_PER_PAIR_MAX as REGIONS_MAX;
 use crate::math::{Point, Vec3, morton_bits};
 
 use super::spot::Spot;
 
-/// Spots of one pair that are told apart; more are taken together, neighbour by neighbour.
+/// Most spots of one pair that are kept separate; beyond that, neighbours are merged.
 pub(super) const SPOTS_MAX: usize = 512;
-/// Steps towards the farthest spot when a sphere is fitted: with none it is some 10 % larger than the least, with three
-/// some 5 %.
+/// Steps towards the farthest spot when a sphere is fitted: with none it is some 10 % larger than the smallest
+/// possible, with three some 5 %.
 const STEPS: u32 = 3;
-/// Spots that are made of fewer by cutting the largest, where they are fewer than this.
+/// The largest spots are cut until there are this many.
 const CUT_UNTIL: usize = 4 * REGIONS_MAX;
 
-/// A group of spots: a range of them, and a sphere round all.
+/// A group of spots: a range of them, and a sphere around all.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ball {
     pub(super) from: usize,
@@ -27,7 +27,7 @@ pub(super) struct Ball {
     pub(super) radius_m: f64,
 }
 
-/// Takes one more spot in; when there is no room, neighbours are taken together first.
+/// Adds a spot; when there is no room, neighbours are merged first.
 pub(super) fn push(all: &mut Vec<Spot>, spot: Spot) {
     if all.len() >= SPOTS_MAX {
         condense(all);
@@ -35,7 +35,7 @@ pub(super) fn push(all: &mut Vec<Spot>, spot: Spot) {
     all.push(spot);
 }
 
-/// Takes neighbours together: along a curve that fills the space, first those pairs that stay small.
+/// Merges neighbours along a space-filling curve, those pairs first that stay small.
 fn condense(all: &mut Vec<Spot>) {
     let (low, high) = corners(all);
     let size = (high - low).map(|side| side.max(f64::MIN_POSITIVE));
@@ -55,7 +55,7 @@ fn condense(all: &mut Vec<Spot>) {
         let apart = (y.centre - x.centre).norm();
         (0.5 * (apart + x.radius_m + y.radius_m)).max(x.radius_m.max(y.radius_m))
     };
-    // Those below the mean; where hardly any are, every second.
+    // Those below the mean; if there are hardly any, every second one.
     let sum: f64 = all.windows(2).map(|two| together(&two[0], &two[1])).sum();
     #[allow(clippy::cast_precision_loss, reason = "a few hundred")]
     let mean = sum / all.len() as f64;
@@ -90,7 +90,7 @@ pub(super) fn cut(all: &mut Vec<Spot>) {
     }
 }
 
-/// Parts the spots into groups, which are ranges of `all` afterwards.
+/// Splits the spots into groups, which are ranges of `all` afterwards.
 pub(super) fn gather(all: &mut [Spot], balls: &mut Vec<Ball>) {
     balls.clear();
     if all.is_empty() {
@@ -111,13 +111,13 @@ pub(super) fn gather(all: &mut [Spot], balls: &mut Vec<Ball>) {
     }
 }
 
-/// Puts the spots nearer to the one than to the other of two far apart first; returns how many.
+/// Moves the spots nearer to A than to B, two spots far apart, to the front; returns how many.
 fn part(spots: &mut [Spot], centre: &Point) -> usize {
     let (_, one) = farthest(spots, centre);
     let (_, other) = farthest(spots, &one);
     let way = other - one;
     let middle = nalgebra::center(&one, &other);
-    // What of a spot lies beyond the middle decides, for large and small ones alike.
+    // The side of its centre decides, for large and small spots alike.
     let mut count = 0;
     for k in 0..spots.len() {
         if way.dot(&(spots[k].centre - middle)) < 0.0 {
@@ -128,7 +128,7 @@ fn part(spots: &mut [Spot], centre: &Point) -> usize {
     count
 }
 
-/// The spot that reaches farthest from a point, and how far.
+/// The spot that reaches farthest from a point, and that distance.
 fn farthest(spots: &[Spot], from: &Point) -> (f64, Point) {
     let (mut most, mut at) = (f64::NEG_INFINITY, spots[0].centre);
     for spot in spots {
@@ -140,7 +140,7 @@ fn farthest(spots: &[Spot], from: &Point) -> (f64, Point) {
     (most, at)
 }
 
-/// Corners of the box round all spots.
+/// Corners of the box around all spots.
 fn corners(spots: &[Spot]) -> (Point, Point) {
     let (mut low, mut high) = (spots[0].centre, spots[0].centre);
     for spot in spots {
@@ -151,12 +151,12 @@ fn corners(spots: &[Spot]) -> (Point, Point) {
     (low, high)
 }
 
-/// A sphere round all spots of a range.
+/// A sphere around all spots of a range.
 ///
-/// Source: Badoiu, Clarkson 2003, Smaller core-sets for balls: towards the farthest, less at each step.
+/// Source: Badoiu, Clarkson 2003, Smaller core-sets for balls: steps towards the farthest, each shorter than the last.
 fn ball(all: &[Spot], from: usize, to: usize) -> Ball {
     let spots = &all[from..to];
-    // One, or one that is everywhere, is its own sphere.
+    // A single spot, or an infinite one, is its own sphere.
     let whole = spots
         .iter()
         .find(|s| spots.len() == 1 || s.radius_m.is_infinite());
@@ -168,7 +168,7 @@ fn ball(all: &[Spot], from: usize, to: usize) -> Ball {
             radius_m: spot.radius_m,
         };
     }
-    // From the middle of the box round all of them.
+    // Starts at the centre of the box around all of them.
     let (low, high) = corners(spots);
     let mut centre = nalgebra::center(&low, &high);
     let mut best = (f64::INFINITY, centre);

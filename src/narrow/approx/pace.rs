@@ -1,33 +1,33 @@
-//! What the regions of one pair may take: boxes that are looked at, and tests that split them.
+//! The work allowed for the regions of one pair: boxes that are read, and tests that split them.
 
 use crate::limits::{REGION_LOOKS_MAX, REGION_TESTS_PER_PAIR};
 use crate::time::Meter;
 
-/// What putting spheres round the spots of a pair takes at most, nanoseconds: it is done whatever the clock says, so
-/// no test is begun when less than this is left.
+/// Longest time for enclosing the spots of a pair in spheres, nanoseconds: it is done regardless of the clock, so no
+/// test starts when less than this is left.
 pub(super) const CLOSING_NS: u64 = 40_000;
 /// Looks, some 0.5 us each, between two reads of the clock.
 const LOOKS_PER_READ: usize = 16;
-/// What a test costs, in cheap units: the clock is read each four tests.
+/// Cost of a test in cheap units: the clock is read every four tests.
 const TEST_COST: u64 = 8;
 
-/// The allowance of one pair, used up as its regions are made.
+/// The allowance of one pair, used up while its regions are made.
 pub(super) struct Pace<'p, 'm> {
-    /// `None`: no test may be done.
+    /// `None`: no tests allowed.
     meter: Option<&'p mut Meter<'m>>,
-    /// Pairs of boxes of one shape pair that may be looked at.
+    /// Most pairs of boxes of one shape pair that may be read.
     looks_max: usize,
     looks: usize,
-    /// Tests that were done.
+    /// Tests done.
     pub(super) tests: u32,
-    /// The meter closed before all was done that the pair may have.
+    /// The meter closed before the pair's allowance was used up.
     pub(super) stopped: bool,
-    /// It closed while boxes were looked at: what was seen is not all.
+    /// It closed while boxes were read: the list of them is incomplete.
     pub(super) cut: bool,
 }
 
 impl<'p, 'm> Pace<'p, 'm> {
-    /// No test, and at most so many looks.
+    /// No tests, and at most `looks_max` looks.
     pub(super) fn coarse(looks_max: usize) -> Self {
         Self {
             meter: None,
@@ -39,7 +39,7 @@ impl<'p, 'm> Pace<'p, 'm> {
         }
     }
 
-    /// All that a pair may have, while the meter is open.
+    /// The full allowance of a pair, while the meter is open.
     pub(super) fn metered(meter: &'p mut Meter<'m>) -> Self {
         Self {
             meter: Some(meter),
@@ -47,12 +47,12 @@ impl<'p, 'm> Pace<'p, 'm> {
         }
     }
 
-    /// Whether so many pairs of boxes may be looked at.
+    /// Whether this many pairs of boxes may be read.
     pub(super) fn allows(&self, looks: usize) -> bool {
         looks <= self.looks_max
     }
 
-    /// Whether the next pair of boxes is to be looked at. Looks are free but of time, as what they look at is known.
+    /// Whether the next pair of boxes is to be read. Looks cost only time: the data they read is already known.
     pub(super) fn look(&mut self) -> bool {
         self.looks += 1;
         if let Some(meter) = self.meter.as_mut()
@@ -64,7 +64,7 @@ impl<'p, 'm> Pace<'p, 'm> {
         !self.cut
     }
 
-    /// Whether another test may be done; if so it is charged.
+    /// Whether another test may be done; if so, charges it.
     pub(super) fn test(&mut self) -> bool {
         let Some(meter) = self.meter.as_mut() else {
             return false;

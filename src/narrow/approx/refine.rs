@@ -1,13 +1,13 @@
-//! Splitting regions out of the budget, and what is kept of them.
+//! Splitting regions within the budget, and which results are kept.
 //!
-//! It comes after verdicts, bounds and contacts: what these find out narrows regions too, and stays proved when the
-//! pair moves. A reader of `regions` wants them most where the budget does not reach for all of that, so one part of
-//! [`KEPT_PARTS`] is kept back for them while pairs are open, and given to the others again where they do not need it.
+//! It comes after verdicts, bounds and contacts: their work narrows regions too, and stays proved when the pair moves.
+//! A reader of `regions` needs them most when the budget does not suffice for all of that, so one part in
+//! [`KEPT_PARTS`] is reserved for them while pairs are open, and released to the others if they do not need it.
 //!
-//! Pairs have their turn by how long ago they were asked last. A test that splits a box drops what is apart at these
-//! poses, and no proof of it is kept; so a pair that moves starts from what its front knows, and one at rest keeps its
-//! regions. Refused: proofs of these too (a front has them already, and goes where it matters), and regions widened by
-//! motion (what has come to touch elsewhere would be in none).
+//! Pairs have their turn in the order of their last one. A test that splits a box drops what is apart at these poses,
+//! and keeps no proof; so a moving pair starts from what its front knows, and one at rest keeps its regions. Refused:
+//! proofs for these tests too (a front has them already, and goes where it matters), and regions widened by motion (a
+//! place that has come to touch elsewhere would be in none).
 
 use crate::ids::PairSlot;
 use crate::limits::REGIONS_PER_PAIR_MAX;
@@ -22,24 +22,24 @@ use crate::world::World;
 use super::pace::{CLOSING_NS, Pace};
 use super::{Approx, Place, Region};
 
-/// One part of so many of the budget is kept back for regions while somebody reads them: at a quarter of the work 16
-/// tests of a pair take its median radius from 24 to 14 % of the diameter, and an eighth of the work costs its verdict
-/// next to nothing (`benches/time_critical`).
+/// One in this many parts of the budget is reserved for regions while they are read: at a quarter of the work, 16 tests
+/// of a pair reduce its median radius from 24 to 14 % of the diameter, and an eighth of the work costs its verdict next
+/// to nothing (`benches/time_critical`).
 const KEPT_PARTS: u64 = 8;
 
-/// The regions of a pair, and where they were made.
+/// The regions of a pair, and the poses they were made at.
 #[derive(Debug)]
 pub(in crate::narrow) struct Kept {
     rel: Pose,
     bent: Bent,
-    /// Turns of work that the pair had had.
+    /// Turns of work that the pair had had by then.
     turns: u32,
     contacts_tick: u64,
     /// Last tick in which the pair had its turn of splitting.
     asked: u64,
-    /// Tests behind them; `None`: they were made by looks alone.
+    /// Number of tests used; `None`: made by looks alone.
     tests: Option<u32>,
-    /// No test was left to be done.
+    /// No test was left to do.
     whole: bool,
     pub(super) complete: bool,
     pub(super) clipped: bool,
@@ -74,7 +74,7 @@ impl Kept {
 }
 
 impl Narrow {
-    /// Keeps back what a reader of `regions` is to have.
+    /// Reserves budget for a reader of `regions`.
     pub(in crate::narrow) fn keep_back_for_regions(
         wanted: Wanted,
         meter: &mut Meter<'_>,
@@ -86,7 +86,7 @@ impl Narrow {
         }
     }
 
-    /// Splits what pairs with meshes may share, pair by pair, while the meter is open.
+    /// Splits regions of pairs with meshes, pair by pair, while the meter is open.
     pub(in crate::narrow) fn spend_on_regions(
         &mut self,
         world: &World,
@@ -129,7 +129,7 @@ impl Narrow {
         self.approx = approx;
     }
 
-    /// What was made of a pair before and still holds: what splitting has made, and of a complete pair whatever was.
+    /// Earlier regions of a pair that still hold: those made by splitting, and any of a complete pair.
     pub(super) fn kept_regions(&self, slot: PairSlot, here: &Place) -> Option<&Kept> {
         let memo = self.memos.get(slot.index())?;
         let kept = self.kept.get(memo.regions)?;
@@ -137,9 +137,9 @@ impl Narrow {
         (serves && kept.holds(here, memo.contacts_tick)).then_some(kept)
     }
 
-    /// Keeps the regions just made, unless those of more tests hold.
+    /// Keeps the regions just made, unless stored ones made with more tests still hold.
     ///
-    /// * `pace` - what splitting took; `None`: they were made by looks alone.
+    /// * `pace` - the allowance that splitting used; `None`: they were made by looks alone.
     pub(super) fn keep_regions(
         &mut self,
         slot: PairSlot,
@@ -181,7 +181,7 @@ impl Narrow {
         kept.all.extend_from_slice(&approx.regions);
     }
 
-    /// Gathers the pairs that are to be split, by when they were asked last.
+    /// Collects the pairs to be split, ordered by their last turn.
     fn line_up_for_regions(&mut self, world: &World, order: Order) -> Line {
         let mut keyed = std::mem::take(&mut self.keyed);
         keyed.clear();
@@ -198,7 +198,7 @@ impl Narrow {
         line
     }
 
-    /// When a pair was asked last (0: never), if splitting can make its regions smaller.
+    /// When a pair had its last turn (0: never), if splitting can make its regions smaller.
     fn owes_regions(&self, slot: PairSlot, world: &World) -> Option<u64> {
         let hot = self.hot.get(slot.index())?;
         let open = matches!(hot.verdict, Verdict::Possible | Verdict::Colliding);

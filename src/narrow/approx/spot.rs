@@ -1,39 +1,39 @@
-//! Where two boxes overlap: a place that holds whatever the two share.
+//! Where two boxes overlap: a place that contains everything the two share.
 //!
-//! In: a box, and slabs that the rest must lie in. Out: a smaller box along the same axes, as a sphere that can be cut
-//! along its longest side.
+//! In: a box, and slabs that bound it. Out: a smaller box along the same axes, as a sphere that can be cut along its
+//! longest side.
 
 use std::cmp::Ordering;
 
 use crate::math::{Point, Vec3};
 use crate::shape::{BoxId, Cone, Obb};
 
-/// Added to sides, as a share of the boxes: axes rounded to f32 are unit and at right angles only so far.
+/// Added to sides, as a share of the boxes: axes rounded to f32 are only nearly unit and orthogonal.
 const ROUNDED: f64 = 1e-6;
-/// A slab that leans further (cosine) tells nothing of a coordinate.
+/// A slab whose normal has a smaller cosine with an axis does not bound that coordinate.
 const LEVEL: f64 = 1e-3;
-/// Times that what one coordinate says is handed on to the others: a third round takes less than a hundredth off.
+/// Rounds in which the bounds of one coordinate tighten the others: a third round gains less than a hundredth.
 const ROUNDS: usize = 2;
 
 /// A place where two shapes may touch.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::narrow) struct Spot {
-    /// Centre of a sphere that holds all that the two share here.
+    /// Centre of a sphere that contains everything the two share here.
     pub(in crate::narrow) centre: Point,
     /// Its radius, metres.
     pub(in crate::narrow) radius_m: f64,
-    /// Half of the longest side of the box within, and half the diagonal of the others, metres.
+    /// Half of the longest side of the box inside it, and half the diagonal of the other sides, metres.
     pub(in crate::narrow) along: Vec3,
     pub(in crate::narrow) across_m: f64,
-    /// Where the normals of a contact here point, A to B.
+    /// Possible normals of a contact here, A to B.
     pub(in crate::narrow) cone: Cone,
-    /// How deep a contact found here is, metres; NaN: nothing was found.
+    /// Depth of a contact found here, metres; NaN: none was found.
     pub(in crate::narrow) depth_m: f64,
-    /// The boxes that it is of.
+    /// The two boxes it belongs to.
     pub(in crate::narrow) boxes: (BoxId, BoxId),
 }
 
-/// What lies between two parallel planes: `low <= normal . (x - centre of the box) <= high`, metres.
+/// The points between two parallel planes: `low <= normal . (x - centre of the box) <= high`, metres.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::narrow) struct Slab {
     pub(in crate::narrow) normal: Vec3,
@@ -42,11 +42,11 @@ pub(in crate::narrow) struct Slab {
 }
 
 impl Spot {
-    /// What of a box lies in all the slabs; `None`: nothing does.
+    /// The part of a box that lies in all slabs; `None`: there is none.
     ///
-    /// Each slab bounds each coordinate by what the others leave of it.
+    /// Each slab bounds each coordinate, given the ranges of the others.
     ///
-    /// * `size` - what rounding is a share of, metres; `slop_m` is added to it.
+    /// * `size` - scale of the rounding errors, metres; `slop_m` is added to it.
     pub(in crate::narrow) fn of(of: &Obb, slabs: &[Slab], size: f64, slop_m: f64) -> Option<Self> {
         let pad = ROUNDED * size + slop_m;
         let mut high = of.half.map(|h| f64::from(h) + pad);
@@ -59,7 +59,7 @@ impl Spot {
                 let (x, y) = (on[k] * low[k], on[k] * high[k]);
                 (least[k], most[k]) = (x.min(y), x.max(y));
             }
-            // What the slab leaves to one coordinate when the others take their least and their most.
+            // The slab's bounds on one coordinate when the others take their least and greatest values.
             let over = slab.high + pad - (least[0] + least[1] + least[2]);
             let under = slab.low - pad - (most[0] + most[1] + most[2]);
             if over < 0.0 || under > 0.0 {
@@ -93,7 +93,7 @@ impl Spot {
         })
     }
 
-    /// Around points, at least one, and all within `margin_m` of them and between them.
+    /// Around at least one point: everything within `margin_m` of the points and between them.
     pub(in crate::narrow) fn round(points: &[Point], margin_m: f64) -> Self {
         let mut ends = (points[0], points[0], 0.0);
         for (k, p) in points.iter().enumerate() {
@@ -129,7 +129,7 @@ impl Spot {
     pub(in crate::narrow) fn shared(p: &Obb, q: &Obb, slop_m: f64) -> Option<Self> {
         let size = |b: &Obb| b.half.iter().map(|h| f64::from(*h)).sum::<f64>();
         let (size_p, size_q) = (size(p), size(q));
-        // The smaller one is cut: the larger one's slabs then all count.
+        // The smaller one is cut, so that all slabs of the larger one matter.
         let (of, by) = if size_p <= size_q { (p, q) } else { (q, p) };
         let between = by.centre - of.centre;
         let slabs: [Slab; 3] = std::array::from_fn(|k| {
@@ -141,11 +141,11 @@ impl Spot {
                 high: at + half,
             }
         });
-        // Where they meet at all their centres are within both sizes.
+        // If they meet at all, their centres are within both sizes.
         Self::of(of, &slabs, size_p + size_q, slop_m)
     }
 
-    /// A point that is shared for certain, or a pair of them, `normal` apart: a contact that was found.
+    /// A point that is certainly shared, or a pair of points, `normal` apart: a contact that was found.
     pub(in crate::narrow) fn found(a: &Point, b: &Point, normal: Vec3, depth_m: f64) -> Self {
         let along = (b - a) * 0.5;
         Self {
@@ -159,7 +159,7 @@ impl Spot {
         }
     }
 
-    /// The same cut across its longest side; `None` where that takes next to nothing off, and of what was found.
+    /// The spot cut across its longest side; `None` if that removes next to nothing, and for a contact.
     pub(in crate::narrow) fn halves(&self) -> Option<[Self; 2]> {
         let along = self.along * 0.5;
         let square = along.norm_squared() + self.across_m * self.across_m;
@@ -175,7 +175,7 @@ impl Spot {
         })
     }
 
-    /// A sphere round both, with the normals of both.
+    /// A sphere around both, with the normals of both.
     pub(in crate::narrow) fn with(&self, other: &Self) -> Self {
         let way = other.centre - self.centre;
         let apart = way.norm();
@@ -209,7 +209,7 @@ impl Spot {
 }
 
 impl Ord for Spot {
-    /// The largest is the greatest; ties by place, for equal replays.
+    /// The largest compares greatest; ties by place, for equal replays.
     fn cmp(&self, other: &Self) -> Ordering {
         let place = |s: &Self| (s.boxes.0.0, s.boxes.1.0);
         (self.radius_m.total_cmp(&other.radius_m)).then_with(|| place(self).cmp(&place(other)))

@@ -1,4 +1,4 @@
-//! Runs and heaps against those of the standard library; growth, limits, and memory touched ahead.
+//! Runs and heaps compared with the standard library; growth, limits, and memory touched ahead.
 
 use super::*;
 use crate::time::ManualClock;
@@ -16,7 +16,7 @@ impl Linked for u32 {
 }
 
 proptest! {
-    /// Runs and heaps of the standard library side by side; most steps put in, some take out, few give back.
+    /// Next to heaps of the standard library; most steps add items, some remove, few release.
     #[test]
     fn runs_behave_as_heaps_of_their_own(
         steps in proptest::collection::vec((0..5_usize, 0..100_u32, 0..200_u32), 0..1500)
@@ -94,7 +94,7 @@ fn a_full_arena_says_so_and_what_is_given_back_is_used_again() {
     // Blocks of 4, 8, 16 and 32: the next would be one of 64.
     assert_eq!(count, 32);
     assert_eq!(arena.all(&one), (0..32).collect::<Vec<_>>());
-    // Those that it grew out of are left to others, and then its own.
+    // The blocks that it grew out of are reused by others, and then its own.
     (0..16).for_each(|k| assert!(arena.push(&mut other, k)));
     let before = arena.bytes();
     arena.release(&mut one);
@@ -149,7 +149,7 @@ fn memory_is_touched_ahead_a_little_at_a_time_and_nothing_is_in_it() {
     }
 }
 
-/// Three runs that have grown beside one that was given back, and one that has nothing.
+/// Three runs that have grown, a released one between them, and an empty one.
 fn grown() -> (Arena<u32>, [Run; 4]) {
     let mut arena = Arena::new(1 << 10);
     let mut runs: [Run; 4] = Default::default();
@@ -161,7 +161,7 @@ fn grown() -> (Arena<u32>, [Run; 4]) {
     (arena, [a, b, c, Run::default()])
 }
 
-/// What is broken, and what is told of it.
+/// A fault to introduce, and the message expected for it.
 type Fault = (&'static str, fn(&mut Arena<u32>, &mut [Run; 4]));
 
 const FAULTS: [Fault; 9] = [

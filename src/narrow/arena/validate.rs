@@ -1,15 +1,15 @@
-//! Checks the whole structure of an arena: every block is free or somebody's, and what is to be a heap is one.
+//! Checks the structure of an arena: every block is free or has an owner, and each heap is one.
 
 use super::{Arena, BLOCK_MIN, CLASSES, Linked, NONE, PLACE_BITS, Run, split};
 use crate::ids::small;
 
 impl<T: Linked> Arena<T> {
-    /// Structure check: each block is free or of one owner, and side by side they fill the chunks.
+    /// Structure check: each block is free or has one owner, and together they fill the chunks.
     ///
-    /// * `owners` - the runs of all who may hold a block.
+    /// * `owners` - the runs of all owners of blocks.
     ///
     /// # Errors
-    /// One sentence on the first thing that does not hold.
+    /// One sentence on the first violation.
     pub(in crate::narrow) fn validate(&self, owners: &[&Run]) -> Result<(), String> {
         if let Some(run) = owners.iter().find(|run| run.len > run.room) {
             return Err(format!("{} items in a block of {}", run.len, run.room));
@@ -52,7 +52,7 @@ impl<T: Linked> Arena<T> {
     /// Adds the free blocks of a size.
     fn add_free(&self, class: usize, blocks: &mut Vec<(u32, usize)>) -> Result<(), String> {
         let mut at = self.free[class];
-        // Of this size no more can be free than fit.
+        // More of this size than fit cannot be free.
         for _ in 0..=self.len / BLOCK_MIN {
             if at == NONE {
                 return Ok(());
@@ -72,10 +72,10 @@ impl<T: Linked> Arena<T> {
 }
 
 impl<T: Linked + Ord> Arena<T> {
-    /// Structure check: no item of a run comes before the one above it.
+    /// Structure check: no item of a run that is a heap is greater than its parent.
     ///
     /// # Errors
-    /// Which one does.
+    /// The first item that is.
     pub(in crate::narrow) fn validate_heap(&self, run: &Run) -> Result<(), String> {
         let items = self.all(run);
         match (1..items.len()).find(|&at| items[(at - 1) / 2] < items[at]) {

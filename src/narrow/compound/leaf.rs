@@ -1,5 +1,5 @@
-//! A pair of shapes of two bodies: one exact query, a front of its own where one is a mesh, or a query at one pose
-//! where the other is a half-space.
+//! A pair of shapes of two bodies: one exact query; if one is a mesh, a front of its own, or with a half-space a query
+//! at one pose.
 
 use crate::math::{Interval, Pose};
 use crate::narrow::Counters;
@@ -26,14 +26,14 @@ use crate::world::{Body, PlacedShape};
 use super::side::Side;
 use super::{Asked, CompoundFront};
 
-/// What is kept of two shapes that are farther apart than so many times the smaller one's radius is given back: they
-/// will not be asked for long.
+/// Memory of two shapes that are farther apart than this times the smaller one's radius is released: they will not be
+/// queried for long.
 const FAR: f64 = 1.0;
 
-/// What fronts of bodies work with.
+/// The tools of fronts of bodies.
 pub(in crate::narrow) struct Tools<'a> {
     pub(in crate::narrow) shelves: &'a mut Shelves,
-    /// Contacts of the query at hand.
+    /// Contacts of the current query.
     pub(in crate::narrow) found: &'a mut Vec<Contact>,
     pub(in crate::narrow) counters: &'a mut Counters,
     /// How surfaces are searched.
@@ -41,18 +41,18 @@ pub(in crate::narrow) struct Tools<'a> {
     pub(in crate::narrow) tick: u64,
 }
 
-/// What is kept of a pair of shapes of which one is a mesh.
+/// Memory of a pair of shapes of which one is a mesh.
 #[derive(Debug)]
 pub(super) struct Inner {
     /// Of the shapes in their bodies.
     pub(super) places: (u32, u32),
     /// Of two surfaces, or a surface and a convex shape.
     pub(super) front: u32,
-    /// Of a mesh and a half-space: its query, while it is under way.
+    /// Of a mesh and a half-space: its query, while in progress.
     cursor: u32,
-    /// It touched when it was last asked.
+    /// It touched when last queried.
     touched: bool,
-    /// It was asked since the last fresh start.
+    /// It was queried since the last fresh start.
     pub(super) asked: bool,
 }
 
@@ -72,14 +72,14 @@ impl Inner {
         (self.front, self.cursor)
     }
 
-    /// Gives its memory back.
+    /// Releases its memory.
     pub(super) fn release(&mut self, shelves: &mut Shelves) {
         shelves.give_front(&mut self.front);
         shelves.give_cursor(&mut self.cursor);
     }
 }
 
-/// Two shapes at the pose worked at.
+/// Two shapes at the current pose.
 struct Pair<'a> {
     bodies: (&'a Body, &'a Body),
     one: &'a PlacedShape,
@@ -90,7 +90,7 @@ struct Pair<'a> {
     pos12: Pose,
 }
 
-/// What a query of two shapes found at the pose worked at.
+/// The result of a query of two shapes at the current pose.
 struct Answer {
     gap: Interval,
     /// 0 inside the interval means touching.
@@ -99,7 +99,7 @@ struct Answer {
 }
 
 impl CompoundFront {
-    /// Queries a pair of shapes, as far as the farthest goal asked for at this pose; what is not finished stays open.
+    /// Queries a pair of shapes, up to the strongest goal set at this pose; what is not finished stays open.
     ///
     /// * `known_m` - a bound on their gap that holds at this pose.
     pub(super) fn leaf(
@@ -113,7 +113,7 @@ impl CompoundFront {
     ) {
         let (low, leaf) = (f64::NEG_INFINITY, Group::of_leaves(id_a, id_b));
         let (Some((i, one)), Some((j, other))) = (a.shape(id_a), b.shape(id_b)) else {
-            // Not reached: nothing is known of what is not there.
+            // Not reached: nothing is known of shapes that do not exist.
             (self.known.low, self.known.certain) = (low, false);
             let (a, b) = (id_a, id_b);
             return (self.cover).touch(&mut tools.shelves.store.entries, Open { low, a, b });
@@ -163,7 +163,7 @@ impl CompoundFront {
         }
     }
 
-    /// The one query that decides two shapes without meshes.
+    /// Runs the single query that decides two shapes without meshes.
     fn query_once(&mut self, tools: &mut Tools<'_>, pair: &Pair<'_>) -> Answer {
         tools.counters.queries += 1;
         let shapes = (&pair.one.shape, &pair.other.shape);
@@ -239,7 +239,7 @@ impl CompoundFront {
         let gap = bodies(front.interval());
         let far = gap.min > margin_m;
         if !done && !far {
-            // What is known of its upper end holds for the whole.
+            // Its upper end holds for the whole.
             self.known.high = self.known.high.min(gap.max);
             return None;
         }
@@ -260,8 +260,8 @@ impl CompoundFront {
         })
     }
 
-    /// A turn of the query of a mesh and a half-space, which is finished at the pose it was begun at; `None`: there is
-    /// more to do.
+    /// A turn of the query of a mesh and a half-space, which is finished at the pose it began at; `None`: there is more
+    /// to do.
     fn turn_cursor(
         &mut self,
         tools: &mut Tools<'_>,
@@ -281,7 +281,7 @@ impl CompoundFront {
         } = &mut *tools.shelves;
         let fresh = inner.cursor == NONE;
         let cursor = cursors.get_or_take(&mut inner.cursor)?;
-        // A walk at another pose tells no more than a verdict: one for more is not waited for.
+        // A walk at another pose gives no more than a verdict: do not wait for one with a larger goal.
         let here = (cursor.rel, cursor.bent) == now;
         if fresh || cursor.goal < goal || cursor.goal > Goal::Verdict && !here {
             cursor.start(pair.places, now, 0.0, tools.tick, goal);
@@ -308,7 +308,7 @@ impl CompoundFront {
         let here = whole && since_m == 0.0;
         let decided = goal == Goal::Verdict && (gap.max <= 0.0 || gap.min > margin_m);
         if whole && !here && !decided {
-            // It tells of another pose: once more, at this one.
+            // Its result is for another pose: once more, at this one.
             cursor.start(pair.places, now, 0.0, tools.tick, goal);
         }
         if !here && !decided {
@@ -331,12 +331,12 @@ impl CompoundFront {
         Some(answer)
     }
 
-    /// Where what is kept of a pair of shapes is, or would be.
+    /// The index of a pair of shapes in `inner`, or where it would be inserted.
     pub(super) fn place_of(&self, places: (u32, u32)) -> Result<usize, usize> {
         (self.inner).binary_search_by_key(&places, |inner| inner.places)
     }
 
-    /// What is kept of a pair of shapes.
+    /// The memory of a pair of shapes.
     fn inner_at(&mut self, places: (u32, u32)) -> &mut Inner {
         let at = self.place_of(places).unwrap_or_else(|at| {
             self.inner.insert(at, Inner::new(places));

@@ -1,4 +1,4 @@
-//! One body of a pair as boxes: the tree over its shapes, or the box of its only one; half-spaces stand beside it.
+//! One body of a pair as boxes: the tree over its shapes, or the box of its only one; half-spaces are kept separately.
 
 use crate::math::{Pose, ROUND, Vec3};
 use crate::narrow::cover::Group;
@@ -13,9 +13,9 @@ const PLANE: u32 = 1 << 30;
 /// One body of a pair.
 pub(super) struct Side<'a> {
     pub(super) body: &'a Body,
-    /// Of several shapes.
+    /// For a body of several shapes.
     tree: Option<&'a PartTree>,
-    /// Of one shape that has a box.
+    /// For a body of one shape that has a box.
     whole: Obb,
 }
 
@@ -35,7 +35,7 @@ impl<'a> Side<'a> {
         Self { body, tree, whole }
     }
 
-    /// The boxes that everything is below.
+    /// The root boxes: everything is below one of them.
     pub(super) fn roots(&self) -> impl Iterator<Item = BoxId> {
         let boxes = self.tree.is_none_or(|tree| tree.boxes.is_some());
         let planes = self.tree.map_or(&[][..], |tree| &tree.planes);
@@ -61,12 +61,12 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// How large a box is, to be compared with another: the sum of its half sides' squares, square metres.
+    /// Size of a box for comparisons: the sum of its half sides' squares, square metres.
     pub(super) fn size(&self, id: BoxId) -> f32 {
         self.obb(id).half.iter().map(|h| h * h).sum()
     }
 
-    /// The boxes that share a parent.
+    /// The pack of boxes that share a parent.
     pub(super) fn pack(&self, pack: u32) -> Option<&'a ObbPack> {
         self.boxes()?.packs().get(pack as usize)
     }
@@ -96,18 +96,18 @@ impl<'a> Side<'a> {
         Some(Plane { normal, offset })
     }
 
-    /// Greatest distance of a number that it is told by from its body's origin, metres.
+    /// Greatest distance of any of its coordinates from its body's origin, metres.
     fn reach_m(&self) -> f64 {
         match (self.tree, &*self.body.shapes) {
             (Some(tree), _) => tree.reach_m,
             (None, [only]) => only.reach_m(),
-            // Not reached: without a tree there is but one.
+            // Not reached: without a tree there is only one.
             (None, _) => f64::INFINITY,
         }
     }
 }
 
-/// Where two bodies stand, ready for their boxes.
+/// The relative pose of two bodies, prepared for their boxes.
 pub(super) fn placed(a: &Side<'_>, b: &Side<'_>, rel: &Pose) -> Placed {
     let lag = |side: &Side<'_>| match &*side.body.shapes {
         [only] => only.shape.lag_m(),
@@ -120,7 +120,7 @@ pub(super) fn placed(a: &Side<'_>, b: &Side<'_>, rel: &Pose) -> Placed {
     }
 }
 
-/// The box that stays and the pack that takes the other's place, of two boxes of which at least one is no leaf.
+/// The box that is kept and the pack that replaces the other, for two boxes of which at least one is no leaf.
 pub(super) fn children((a, id_a): (&Side<'_>, BoxId), (b, id_b): (&Side<'_>, BoxId)) -> Group {
     let (held_a, held_b) = (a.held(id_a), b.held(id_b));
     let group = Group::parting((id_a, held_a), (id_b, held_b), || {
@@ -131,7 +131,7 @@ pub(super) fn children((a, id_a): (&Side<'_>, BoxId), (b, id_b): (&Side<'_>, Box
     Group { mask, ..group }
 }
 
-/// Sound lower bounds on the gaps of a group's pairs, metres; zero or less where they may touch.
+/// Sound lower bounds on the gaps of a group's pairs, metres; zero or less if they may touch.
 pub(super) fn gaps(group: &Group, (a, b): (&Side<'_>, &Side<'_>), at: &Placed) -> [f64; LANES] {
     let (one, other) = if group.pack_is_b { (a, b) } else { (b, a) };
     let Some(pack) = other.pack(group.pack) else {
@@ -144,7 +144,7 @@ pub(super) fn gaps(group: &Group, (a, b): (&Side<'_>, &Side<'_>), at: &Placed) -
 }
 
 impl Plane {
-    /// In B's frame where it is A's, in A's where it is B's.
+    /// In B's frame if it is A's, in A's if it is B's.
     fn seen_from_other(&self, at: &Placed, is_a: bool) -> Self {
         let shift = at.pos12.translation.vector;
         if is_a {
@@ -158,7 +158,7 @@ impl Plane {
         }
     }
 
-    /// How far each box of a pack is above it at least, metres. Lanes without a box yield anything.
+    /// A lower bound on the height of each box of a pack above it, metres. Lanes without a box yield arbitrary values.
     fn gaps(&self, pack: &ObbPack, at: &Placed) -> [f64; LANES] {
         let boxes = &pack.boxes;
         std::array::from_fn(|lane| {
@@ -170,7 +170,7 @@ impl Plane {
                     f64::from(boxes.half[k][lane]) * self.normal.dot(&axis).abs()
                 })
                 .sum();
-            // Axes in f32 are at right angles to one another but for their rounding.
+            // Axes in f32 are orthogonal only up to rounding.
             let half: f64 = (0..3).map(|k| f64::from(boxes.half[k][lane])).sum();
             let rounding =
                 16.0 * ROUND * (centre.lp_norm(1) + self.offset.abs()) + GAP_ROUND * half;
@@ -179,7 +179,7 @@ impl Plane {
     }
 }
 
-/// The box around a shape at its place, along the shape's own axes.
+/// The box around a placed shape, along the shape's own axes.
 fn around(placed: &PlacedShape) -> Obb {
     let own = Obb::around(&placed.shape.aabb);
     Obb {

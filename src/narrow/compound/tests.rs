@@ -1,4 +1,4 @@
-//! The front of two bodies of several shapes against its twin: every pair of their shapes asked by itself.
+//! The front of two bodies of several shapes compared with its reference: every pair of shapes queried separately.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use crate::time::{ManualClock, Meter};
 use crate::wire::Verdict;
 use crate::world::World;
 
-/// Of bodies of that many shapes: mixed ones, some meshes among them; with a half-space as the last of B's, or alone.
+/// Bodies with these counts of shapes: mixed, some of them meshes; with a half-space as the last of B's, or alone.
 fn bodies(random: &mut Random, counts: [usize; 2], planes: Planes) -> [Body; 2] {
     let mut text = String::new();
     for (body, count) in counts.into_iter().enumerate() {
@@ -70,7 +70,7 @@ enum Planes {
     Only,
 }
 
-/// What every pair of shapes says, asked by itself to the end: the gap of the bodies, and who collides.
+/// The reference: every pair of shapes queried separately to the end: the gap of the bodies, and which shapes collide.
 fn twin((a, b): (&Body, &Body), rel: &Pose) -> (Interval, Vec<(u32, u32)>) {
     let clock = ManualClock::new(0);
     let mut meter = Meter::new(&clock, None, None);
@@ -142,7 +142,7 @@ fn turned(random: &mut Random, angle: f64) -> Quat {
     Quat::from_scaled_axis(axis * angle)
 }
 
-/// The next pose: mostly a small step, at times none, another way, or a leap.
+/// The next pose: usually a small step, sometimes none, another direction, or a leap.
 fn step_on(random: &mut Random, rel: &mut Pose, way: &mut Vec3) {
     match random.range(0.0, 30.0) {
         x if x < 1.0 => {
@@ -161,7 +161,7 @@ fn step_on(random: &mut Random, rel: &mut Pose, way: &mut Vec3) {
     }
 }
 
-/// One pair on its way, cut off at random, each step against its twin.
+/// One moving pair, cut off at random, each step compared with its reference.
 fn drive(random: &mut Random, counts: [usize; 2], planes: Planes, steps: usize) -> [usize; 3] {
     let [a, b] = &bodies(random, counts, planes);
     let clock = ManualClock::new(0);
@@ -286,7 +286,7 @@ fn bug_two_bodies_that_both_have_a_half_space_came_to_no_end_at_another_pose() {
     let clock = ManualClock::new(0);
     for step in 0..6 {
         b.pose = Pose::translation(0.0, 0.0, 3.0 + 0.001 * f64::from(step));
-        // They have no gap, and nothing is worked for one.
+        // They have no gap, and no work is done for one.
         let mut meter = Meter::new(&clock, None, Some(1_000));
         let asked = gap_between(&a, &b, 0.0, &mut meter);
         assert!(!asked.finished && asked.verdict == Verdict::Possible);

@@ -1,4 +1,4 @@
-//! Turns of pairs of which at least one body has several shapes, and what they say of the bodies.
+//! Turns of pairs of which at least one body has several shapes, and what they prove of the bodies.
 
 use crate::ids::PairSlot;
 use crate::math::relative;
@@ -11,7 +11,7 @@ use crate::world::Body;
 use super::Tools;
 
 impl Narrow {
-    /// One turn of a pair on the front of its shapes; whether there is more to do for `goal`.
+    /// One turn of a pair on the front of its shapes. Returns whether there is more to do for `goal`.
     pub(in crate::narrow) fn turn_compound(
         &mut self,
         slot: PairSlot,

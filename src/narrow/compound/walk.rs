@@ -1,4 +1,4 @@
-//! The pairs of shapes of two bodies at one pose, the nearest boxes first: for whoever asks once and keeps nothing.
+//! The pairs of shapes of two bodies at one pose, nearest boxes first: for queries on demand, which keep nothing.
 
 use crate::math::Pose;
 use crate::narrow::cover::lanes;
@@ -8,7 +8,7 @@ use crate::world::Body;
 
 use super::side::{Side, children, gaps, placed};
 
-/// Pairs of boxes that wait, each with a lower bound on its gap, metres; kept from walk to walk for its memory.
+/// Pairs of boxes that wait, each with a lower bound on its gap, metres; its memory is reused from walk to walk.
 #[derive(Debug, Default)]
 pub(in crate::narrow) struct Waiting(Vec<(f64, BoxId, BoxId)>);
 
@@ -39,9 +39,8 @@ impl<'a, 'w> PairWalk<'a, 'w> {
 
     /// The places of the next two shapes; `None`: there are no more, or a test was refused.
     ///
-    /// * `test` - asked before each test of a box against a pack: false refuses it.
-    /// * `worth` - whether a pair whose gap is no less than this is to be looked at, metres; zero or less: it may
-    ///   touch.
+    /// * `test` - called before each test of a box against a pack: false refuses it.
+    /// * `worth` - whether a pair with this lower bound on its gap is to be opened, metres; zero or less: it may touch.
     pub(in crate::narrow) fn next(
         &mut self,
         mut test: impl FnMut() -> bool,

@@ -1,21 +1,21 @@
 //! Which contacts of a pair are kept when there are more than fit. In: all that were found. Out: the deepest, then
-//! those that lie farthest from what is kept already, so that few points span the patches that many made.
+//! those farthest from the ones already kept, so that few points span the patches that many made.
 
 use super::{Contact, KEPT_BEFORE, SAME_NORMAL};
 
 /// Two points nearer than this share of the smaller body's radius, with normals within [`SAME_NORMAL`], are one contact
-/// that two triangles with a common edge have both found.
+/// found by two triangles with a common edge.
 const SAME_PLACE: f64 = 1e-3;
 
-/// Brings the contacts to keep to the front, deepest first; returns how many these are.
+/// Moves the contacts that are kept to the front, deepest first; returns how many.
 ///
 /// * `found` - deepest first.
 /// * `most` - how many are kept at most.
 /// * `radius` - of the smaller body, metres: two contacts with opposite normals are as far apart as two ends of it.
-/// * `was_kept` - whether a contact was kept in the tick before.
+/// * `was_kept` - whether a contact was kept in the last tick.
 ///
-/// Greedy: the one that is farthest from its nearest kept neighbour comes next (Gonzalez 1985, Clustering to minimize
-/// the maximum intercluster distance), never worse than half of the best spread.
+/// Greedy: the contact farthest from its nearest kept neighbour comes next (Gonzalez 1985, Clustering to minimize the
+/// maximum intercluster distance), never worse than half of the best spread.
 ///
 /// Cost: O(`found` x `most`), no allocation.
 pub(super) fn choose(
@@ -29,7 +29,7 @@ pub(super) fn choose(
     if found_len <= most {
         return found_len;
     }
-    // The deepest stays where it is: at the front.
+    // The deepest stays at the front.
     for kept in 1..most {
         let score = |contact: &Contact| {
             let nearest = (found[..kept].iter())
@@ -41,12 +41,12 @@ pub(super) fn choose(
         let mut best = (kept, score(&found[kept]));
         for (at, contact) in found.iter().enumerate().skip(kept + 1) {
             let score = score(contact);
-            // The deeper of two equals: it comes first.
+            // Of two equals the deeper wins: it comes first.
             if score > best.1 {
                 best = (at, score);
             }
         }
-        // What stays behind keeps its order.
+        // The rest keeps its order.
         found[kept..=best.0].rotate_right(1);
     }
     let chosen = most.min(found_len);
@@ -58,7 +58,7 @@ pub(super) fn choose(
     chosen
 }
 
-/// Takes out contacts that a deeper one stands for; returns how many are left, at the front and in order.
+/// Removes contacts that a deeper one represents; returns how many are left, at the front and in order.
 fn merge(found: &mut [Contact], radius: f64) -> usize {
     let mut left = 0;
     for at in 0..found.len() {
@@ -76,7 +76,7 @@ fn merge(found: &mut [Contact], radius: f64) -> usize {
     left
 }
 
-/// How far two contacts are from one another, squared metres: points, and what their normals differ by.
+/// Squared distance of two contacts, square metres: of their points, plus the difference of their normals.
 fn apart(one: &Contact, other: &Contact, radius: f64) -> f64 {
     let turn = (one.normal - other.normal).norm() * 0.5 * radius;
     (one.point_a - other.point_a).norm_squared() + turn * turn

@@ -1,27 +1,27 @@
-//! The manifold of each patch: at most four of its points. In: all points that were found of a pair. Out: of each patch
-//! the deepest, and those that with it span the largest area.
+//! The manifold of each patch: at most four of its points. In: all points found for a pair. Out: of each patch the
+//! deepest point, and those that span the largest area with it.
 //!
-//! A patch is what touches with one normal: points of one shape pair that came in as one, and such patches taken
-//! together whose normals are within 8 degrees and whose boxes lie side by side (two regions of a mesh meet at a ridge,
-//! and what lies on the ridge is one patch). Two shelves of one height are two patches: they are two surfaces, far
+//! A patch is what touches with one normal: points of one shape pair that were found together, merged with other such
+//! patches whose normals are within 8 degrees and whose boxes are next to each other (two regions of a mesh meet at a
+//! ridge, and the points on the ridge are one patch). Two shelves of equal height are two patches: two surfaces, far
 //! apart.
 
 use super::{Contact, KEPT_BEFORE, SAME_NORMAL, SAME_POINT};
 use crate::limits::MANIFOLD_POINTS_MAX;
 use crate::math::{Aabb, Vec3};
 
-/// Points of a patch whose distance from the segment or triangle of the others is a smaller share of the smaller body's
-/// radius span nothing more.
+/// Points of a patch whose distance from the segment or triangle of the others is below this share of the smaller
+/// body's radius add no span.
 const SPANS: f64 = 1e-3;
-/// Points as deep as the deepest but for this share of the radius are as good: of a body that lies flat the outermost
-/// comes first, whatever rounding says.
+/// Points within this share of the radius of the greatest depth count as equally deep: for a body that lies flat, the
+/// outermost comes first, regardless of rounding.
 const AS_DEEP: f64 = 1e-9;
 
 /// Reduces the points of each patch; returns how many are left, at the front.
 ///
-/// * `found` - in any order; `patch` tells those of one shape pair apart.
+/// * `found` - in any order; `patch` distinguishes those of one shape pair.
 /// * `radius` - of the smaller body, metres.
-/// * `was_kept` - whether a contact was kept in the tick before.
+/// * `was_kept` - whether a contact was kept in the last tick.
 ///
 /// Cost: O(n log n) and O(patches^2) of each shape pair; no allocation.
 pub(super) fn reduce(
@@ -54,7 +54,7 @@ fn order(x: &Contact, y: &Contact) -> std::cmp::Ordering {
         .then(x.key().cmp(&y.key()))
 }
 
-/// Gives patches of one surface one number; `found` is of one shape pair, in order.
+/// Gives the patches of one surface the same number; `found` is of one shape pair, in order.
 fn join(found: &mut [Contact], radius: f64) {
     let near = SAME_POINT * radius;
     let mut start = 0;
@@ -68,7 +68,7 @@ fn join(found: &mut [Contact], radius: f64) {
         let (before, here) = found.split_at_mut(start);
         let here = &mut here[..len];
         let bounds = around(here, near);
-        // The deepest stands for its patch.
+        // The deepest point represents its patch.
         let normal = here[0].normal;
         let other = (before.chunk_by(|x, y| x.patch == y.patch))
             .find(|old| {
@@ -81,7 +81,7 @@ fn join(found: &mut [Contact], radius: f64) {
         }
         start += len;
         if changed {
-            // Those that have become one stand together again.
+            // Merged patches are sorted together again.
             found[..start].sort_unstable_by(order);
             changed = false;
         }
@@ -101,7 +101,7 @@ fn meets(x: &Aabb, y: &Aabb) -> bool {
     (0..3).all(|k| x.min[k] <= y.max[k] && y.min[k] <= x.max[k])
 }
 
-/// Brings the points of a patch to keep to the front; returns how many these are.
+/// Moves the points of a patch that are kept to the front; returns how many.
 fn select(patch: &mut [Contact], radius: f64, was_kept: &impl Fn(&Contact) -> bool) -> usize {
     let len = once_each(patch);
     let patch = &mut patch[..len];
@@ -127,7 +127,7 @@ fn select(patch: &mut [Contact], radius: f64, was_kept: &impl Fn(&Contact) -> bo
         let mut best = (kept, 0.0);
         for (k, contact) in patch.iter().enumerate().skip(kept) {
             let mut out = out(contact);
-            // What spans nothing is not kept for having been kept.
+            // A point that adds no span gets no bonus for having been kept.
             if out > least && was_kept(contact) {
                 out *= KEPT_BEFORE;
             }
@@ -143,7 +143,7 @@ fn select(patch: &mut [Contact], radius: f64, was_kept: &impl Fn(&Contact) -> bo
     MANIFOLD_POINTS_MAX.min(len)
 }
 
-/// Takes out points of equal name; the deepest, which come first, stay.
+/// Removes points with equal keys; the deepest, which come first, stay.
 fn once_each(patch: &mut [Contact]) -> usize {
     let mut left = 0;
     for at in 0..patch.len() {

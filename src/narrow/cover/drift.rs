@@ -1,4 +1,4 @@
-//! How far a pair has moved since its certificates were made: a path over anchors, and what has been gone since the
+//! How far a pair has moved since its certificates were made: the path over anchors, plus the displacement since the
 //! last.
 
 use crate::math::{Pose, ROUND};
@@ -7,14 +7,14 @@ use crate::math::{Pose, ROUND};
 #[derive(Clone, Debug)]
 pub(in crate::narrow) struct Drift {
     anchor: Pose,
-    /// The anchor before, and how far the two are apart, metres.
+    /// The previous anchor, and its distance from the present one, metres.
     before: Pose,
     stride_m: f64,
     /// `S`: length of the path over all anchors, metres, rounded up.
     pub(in crate::narrow) path_m: f64,
     /// `d`: displacement from the anchor, metres, rounded up.
     offset_m: f64,
-    /// Displacement at the last move, from the anchor of then, metres.
+    /// Displacement at the last move, from the anchor at that time, metres.
     pub(in crate::narrow) last_m: f64,
 }
 
@@ -36,26 +36,26 @@ impl Drift {
         }
     }
 
-    /// Moves to a pose of the second seen from the first; takes an anchor where the way leads on from the last two.
+    /// Moves to a pose of the second seen from the first; sets an anchor if the motion leads away from the last two.
     ///
-    /// * `moved` - how far any point of the smaller one moves from one pose to another, metres, rounded up.
+    /// * `moved` - how far any point of the smaller shape moves between two poses, metres, rounded up.
     pub(in crate::narrow) fn follow(&mut self, pos12: &Pose, moved: impl Fn(&Pose, &Pose) -> f64) {
         self.offset_m = moved(&self.anchor, pos12);
         self.last_m = self.offset_m;
-        // Back and forth between two places is farther from neither than they are from each other.
+        // A motion back and forth between two places never gets farther from either than their distance.
         if moved(&self.before, pos12) >= self.stride_m + 0.5 * self.offset_m {
             self.anchor_here(pos12);
         }
     }
 
-    /// Adds what the two deformed by, metres, rounded up.
+    /// Adds the deformation of the two, metres, rounded up.
     pub(in crate::narrow) fn add(&mut self, bent_m: f64) {
         let path_m = self.path_m + bent_m;
         self.path_m = path_m + 2.0 * ROUND * path_m;
         self.last_m += bent_m;
     }
 
-    /// Takes an anchor at the pose last moved to; whether it was none before.
+    /// Sets an anchor at the last pose. Returns whether it was not one already.
     pub(in crate::narrow) fn anchor_here(&mut self, pos12: &Pose) -> bool {
         if self.offset_m == 0.0 {
             return false;
@@ -67,14 +67,14 @@ impl Drift {
         true
     }
 
-    /// The path at which a gap found at this pose is used up, rounded down; `None` where it does not outlast this pose.
+    /// The path at which a gap found at this pose is used up, rounded down; `None` if it does not outlast this pose.
     pub(in crate::narrow) fn expiry(&self, gap: f64) -> Option<f64> {
         self.outlasts(gap).then(|| self.used_up_at(gap))
     }
 
-    /// A gap found at this pose that is greater than this outlasts it, metres; one not as great may.
+    /// A gap found at this pose that is greater than this outlasts it, metres; a smaller one may.
     pub(in crate::narrow) fn lasting_m(&self) -> f64 {
-        // What is used up at once, and what is rounded on the way there and back.
+        // The part used up at once, and rounding on the way there and back.
         2.0 * self.offset_m + 16.0 * ROUND * (self.path_m + self.offset_m)
     }
 

@@ -1,5 +1,5 @@
-//! The entries of a cover: pairs of boxes that may touch, and groups of pairs proved apart until the pair has moved so
-//! far.
+//! The entries of a cover: pairs of boxes that may touch, and groups of pairs proved apart until the pair has moved far
+//! enough.
 
 use std::cmp::Ordering;
 
@@ -9,7 +9,7 @@ use crate::shape::{BoxId, Held};
 
 /// A box of one side against boxes of one pack of the other side, all proved apart.
 ///
-/// One expiry stands for up to eight pairs: what tests one of them tests all.
+/// One expiry for up to eight pairs: one test covers all of them.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::narrow) struct Group {
     /// Path of the pair at which the proof ends: gap at the test plus the path until then, rounded down, metres.
@@ -18,11 +18,11 @@ pub(in crate::narrow) struct Group {
     pub(in crate::narrow) one: BoxId,
     /// The pack of the other side.
     pub(in crate::narrow) pack: u32,
-    /// Which boxes of the pack.
+    /// The boxes of the pack that belong to it.
     pub(in crate::narrow) mask: u8,
     /// Whether the pack is B's.
     pub(in crate::narrow) pack_is_b: bool,
-    /// One pair of leaves whose boxes touch and whose triangles do not.
+    /// A pair of leaves whose boxes touch and whose triangles do not.
     pub(in crate::narrow) leaf: bool,
 }
 
@@ -39,8 +39,8 @@ impl Group {
         }
     }
 
-    /// The box that stays and the pack that takes the other's place, of two of which at least one is no leaf: the
-    /// larger is parted, so that both shrink alike. Its mask is yet to be set.
+    /// The box that is kept and the pack that replaces the other, for two boxes of which at least one is no leaf: the
+    /// larger is split, so that both shrink alike. The mask is set later.
     pub(in crate::narrow) fn parting(
         (id_a, held_a): (BoxId, Held),
         (id_b, held_b): (BoxId, Held),
@@ -57,7 +57,7 @@ impl Group {
         };
         let pack = match parted {
             Held::Pack(pack) => pack,
-            // Not reached: of two leaves none is parted.
+            // Not reached: of two leaves none is split.
             Held::Triangle(_) => 0,
         };
         Self {
@@ -70,7 +70,7 @@ impl Group {
         }
     }
 
-    /// The same, no longer proved.
+    /// The same group, no longer proved.
     pub(in crate::narrow) fn expired(self) -> Self {
         Self {
             expiry_m: f64::NEG_INFINITY,
@@ -100,7 +100,7 @@ pub(in crate::narrow) fn lanes(mask: u8) -> impl Iterator<Item = u32> {
 }
 
 impl Ord for Group {
-    /// The soonest expiry is the greatest, so that a heap yields it first; ties by place, for equal replays.
+    /// The soonest expiry compares greatest, so that a heap yields it first; ties by place, for equal replays.
     fn cmp(&self, other: &Self) -> Ordering {
         let place = |g: &Self| (g.one.0, g.pack, g.mask, g.pack_is_b);
         (other.expiry_m.total_cmp(&self.expiry_m)).then_with(|| place(other).cmp(&place(self)))
@@ -124,7 +124,7 @@ impl Eq for Group {}
 /// A pair of boxes that may touch.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::narrow) struct Open {
-    /// About how far the boxes overlap at their test, negative metres: for the order only.
+    /// Approximate overlap of the boxes at their test, negative metres: only for the order.
     pub(in crate::narrow) low: f64,
     pub(in crate::narrow) a: BoxId,
     pub(in crate::narrow) b: BoxId,
@@ -152,13 +152,13 @@ impl PartialEq for Open {
 
 impl Eq for Open {}
 
-/// The pairs of one pair that may touch, in the order of a search.
+/// The pairs of boxes of one pair that may touch, in the order of a search.
 #[derive(Debug, Default)]
 pub(in crate::narrow) struct OpenList {
     search: Search,
     /// A stack, a queue, or a heap.
     items: Run,
-    /// Breadth first: the next to be taken.
+    /// Breadth first: the next item.
     head: usize,
 }
 
@@ -169,7 +169,7 @@ impl OpenList {
         self.head = 0;
     }
 
-    /// False where there is no room.
+    /// False if there is no room.
     pub(in crate::narrow) fn push(&mut self, arena: &mut Arena<Open>, open: Open) -> bool {
         if self.search == Search::Priority {
             arena.push_heap(&mut self.items, open)
@@ -202,19 +202,19 @@ impl OpenList {
         self.items.len() - self.head
     }
 
-    /// The pairs, in no order.
+    /// The pairs, unordered.
     pub(in crate::narrow) fn all<'a>(&self, arena: &'a Arena<Open>) -> &'a [Open] {
         &arena.all(&self.items)[self.head..]
     }
 
-    /// Gives its memory back.
+    /// Releases its memory.
     pub(in crate::narrow) fn release(&mut self, arena: &mut Arena<Open>) {
         arena.release(&mut self.items);
         self.head = 0;
     }
 }
 
-/// The groups of one pair, the one that expires soonest at hand.
+/// The groups of one pair; the one that expires soonest is accessible.
 #[derive(Debug)]
 pub(in crate::narrow) struct Proved {
     pub(in crate::narrow) heap: Run,
@@ -240,7 +240,7 @@ impl Proved {
         self.heap.len()
     }
 
-    /// False where there is no room.
+    /// False if there is no room.
     pub(in crate::narrow) fn push(&mut self, arena: &mut Arena<Group>, group: Group) -> bool {
         let pushed = arena.push_heap(&mut self.heap, group);
         self.note_top(arena);

@@ -4,22 +4,22 @@ use super::{Cover, Entries};
 use crate::narrow::arena::Run;
 
 impl Cover {
-    /// The blocks that it has among groups.
+    /// Its blocks in the arena of groups.
     pub(in crate::narrow) fn runs_of_groups(&self) -> [&Run; 2] {
         [self.proved.run(), &self.passing]
     }
 
-    /// The blocks that it has among open pairs.
+    /// Its blocks in the arena of open pairs.
     pub(in crate::narrow) fn runs_of_open(&self) -> [&Run; 2] {
         [self.open.run(), &self.touching]
     }
 
-    /// Structure check of the heap of certificates, the open list, and what holds at this pose alone.
+    /// Structure check of the heap of certificates, the open list, and the entries that hold only at this pose.
     ///
-    /// * `entries` - in which every block is known to be of one owner.
+    /// * `entries` - every block in it is already known to have one owner.
     ///
     /// # Errors
-    /// One sentence on the first thing that does not hold.
+    /// One sentence on the first violation.
     pub(in crate::narrow) fn validate(&self, entries: &Entries) -> Result<(), String> {
         self.proved.validate(&entries.groups)?;
         self.open.validate(&entries.open)?;
@@ -44,7 +44,7 @@ mod tests {
     use crate::narrow::cover::{Group, Search};
     use crate::shape::BoxId;
 
-    /// Some groups that are proved for long, some for this pose alone, and open pairs.
+    /// Some groups that are proved for long, some only for this pose, and open pairs.
     fn some() -> (Entries, Cover) {
         let (mut entries, mut cover) = (Entries::with_room(1 << 10, 1 << 10), Cover::default());
         let roots = (0..5).map(|at| (BoxId(at), BoxId(9)));
@@ -60,7 +60,7 @@ mod tests {
         (entries, cover)
     }
 
-    /// What is broken, and what is told of it.
+    /// A fault to introduce, and the message expected for it.
     type Fault = (&'static str, fn(&mut Entries, &mut Cover));
 
     const FAULTS: [Fault; 6] = [

@@ -1,17 +1,17 @@
-//! When a cover is the longer way: entries only ever split, and what is used up is asked again one by one.
+//! When to discard a cover and start over: entries only ever split, and expired ones are retested one by one.
 
 use super::{Cover, Entries};
 
-/// A cover that has split into so many times its fresh size, and [`STALE_MORE`], starts anew.
+/// A cover starts over when it has split into this many times its fresh size, plus [`STALE_MORE`].
 const STALE_TIMES: usize = 3;
 const STALE_MORE: usize = 128;
-/// A cover starts anew when so many times its used-up groups exceed the steps that a fresh start took. Of meshes at
-/// 0.5 % of the diameter a tick 2,000 units in place of 2,130 (2), 2,270 (1) and 2,230 (8), at 2 % 4,070 in place of
-/// 4,110, at 0.1 % no difference (`benches/time_critical`).
+/// A cover starts over when its expired groups, times this, exceed the steps that a fresh start took. Measured on
+/// meshes at 0.5 % of the diameter a tick: 2,000 units instead of 2,130 (2), 2,270 (1) and 2,230 (8); at 2 % 4,070
+/// instead of 4,110; at 0.1 % no difference (`benches/time_critical`).
 const WORN_TIMES: usize = 3;
-/// Length of a path, in sizes of the two, after which expiries are measured anew: few digits are left of them.
+/// Path length, in sizes of the two, after which expiries are measured from zero again: few digits are left of them.
 const PATH_MAX: f64 = 64.0;
-/// Beyond this share of the smaller one's radius between two poses, nothing much would be left.
+/// Beyond this share of the smaller one's radius between two poses, few certificates would survive.
 const LEAP: f64 = 0.1;
 
 /// What was counted since the last fresh start.
@@ -24,19 +24,19 @@ pub(in crate::narrow) struct Wear {
 }
 
 impl Wear {
-    /// A step of work was done.
+    /// Counts a step of work.
     pub(in crate::narrow) fn note_step(&mut self) {
         self.steps += 1;
     }
 
-    /// The pair is settled: the first time after a fresh start says how much a fresh start takes.
+    /// The pair is settled: the first time after a fresh start records the cost of a fresh start.
     pub(in crate::narrow) fn note_settled(&mut self, cover: &Cover) {
         if self.fresh_len == 0 {
             (self.fresh_len, self.fresh_steps) = (cover.len(), self.steps);
         }
     }
 
-    /// Whether the roots are the shorter way at the pose moved to: large boxes tell more than many small ones.
+    /// Whether starting over from the roots is cheaper at the new pose: large boxes prove more than many small ones.
     ///
     /// * `radii_m` - of the two.
     pub(in crate::narrow) fn is_worn_out(
@@ -46,7 +46,7 @@ impl Wear {
         radii_m: [f64; 2],
     ) -> bool {
         let (drift, [a, b]) = (&cover.drift, radii_m);
-        // One of the two may have no end.
+        // One of the two may be unbounded.
         let size_m = if (a + b).is_finite() { a + b } else { a.min(b) };
         let settled = self.fresh_len > 0;
         cover.is_lost()
@@ -58,9 +58,9 @@ impl Wear {
 }
 
 impl Cover {
-    /// Whether more than so many groups are no longer proved apart.
+    /// Whether more than `most` groups are no longer proved apart.
     ///
-    /// Cost: a look at each that is not and at the two below it, up to so many: of 100,000 groups few expire in a tick.
+    /// Cost: one look at each expired group and at the two below it, up to `most`: few of 100,000 expire in a tick.
     fn has_more_expired_than(&self, entries: &Entries, most: usize) -> bool {
         let heap = entries.groups.all(&self.proved.heap);
         let (mut at, mut count) = (0, 0);
@@ -73,7 +73,7 @@ impl Cover {
                 at = 2 * at + 1;
                 continue;
             }
-            // All below it holds longer: on to what is beside it, or beside one above.
+            // Everything below it expires later: go on with its sibling, or the sibling of an ancestor.
             while at % 2 == 0 {
                 if at == 0 {
                     return false;

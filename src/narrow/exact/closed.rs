@@ -1,7 +1,7 @@
 //! Closed forms: a point against a ball, segment, box, cylinder or cone, and two segments. With their margins these
-//! are all pairs of spheres and capsules, and a sphere against every primitive.
+//! cover all pairs of spheres and capsules, and a sphere against every primitive.
 //!
-//! In: a pair. Out: the gap of the cores, or `None` where there is no closed form.
+//! In: a pair. Out: the gap of the cores, or `None` if there is no closed form.
 
 use super::pair::{CoreGap, Held, Pair, frame, unit};
 use crate::math::Vec3;
@@ -52,7 +52,7 @@ fn with_lower(pair: &Pair<'_>, normal: Vec3, gap: f64, point_a: Vec3, point_b: V
     }
 }
 
-/// Where a point stands to a core, in the core's frame.
+/// A point relative to a core, in the core's frame.
 pub(super) struct Near {
     /// Closest point of the surface.
     surface: Vec3,
@@ -63,7 +63,7 @@ pub(super) struct Near {
 }
 
 impl Near {
-    /// For a point outside whose closest point is known; `flat` is the outward direction should they be one.
+    /// For a point outside whose closest point is known; `flat` is the outward direction if they coincide.
     fn outside(point: &Vec3, surface: Vec3, flat: Vec3) -> Self {
         let between = point - surface;
         Self {
@@ -82,7 +82,7 @@ impl Near {
     }
 }
 
-/// Where a point stands to a core, in the core's frame; `None` for a hull or triangle.
+/// A point relative to a core, in the core's frame; `None` for a hull or triangle.
 pub(super) fn nearest(core: &Core, point: &Vec3) -> Option<Near> {
     match core {
         Core::Point => Some(Near::outside(point, Vec3::zeros(), Vec3::z())),
@@ -104,7 +104,7 @@ fn to_cuboid(half: &Vec3, point: &Vec3) -> Near {
         point.z.clamp(-half.z, half.z),
     );
     let over = point.abs() - half;
-    // The face that is nearest: inside it is the way out, and on the surface the outward direction.
+    // The nearest face: for a point inside it is the way out, for one on the surface the outward direction.
     let k = over.imax();
     let face = Vec3::ith(k, 1.0_f64.copysign(point[k]));
     if over[k] > 0.0 {
@@ -114,7 +114,7 @@ fn to_cuboid(half: &Vec3, point: &Vec3) -> Near {
     }
 }
 
-/// Radial unit vector of a point (x where it lies on the axis) and its distance from the axis.
+/// Radial unit vector of a point (x if it lies on the axis) and its distance from the axis.
 fn radial(point: &Vec3) -> (Vec3, f64) {
     let radial = Vec3::new(point.x, point.y, 0.0);
     (
@@ -146,7 +146,7 @@ fn to_cylinder(radius_m: f64, half_m: f64, point: &Vec3) -> Near {
 
 fn to_cone(radius_m: f64, half_m: f64, point: &Vec3) -> Near {
     let (radial, off) = radial(point);
-    // In the half plane of the point: from the apex (0, h) down the slant to (r, -h); its outward normal.
+    // In the half plane of the point: down the slant from the apex (0, h) to (r, -h), and its outward normal.
     let length = radius_m.hypot(2.0 * half_m);
     let slant = radial * (2.0 * half_m / length) + Vec3::z() * (radius_m / length);
     let down = radial * (radius_m / length) - Vec3::z() * (2.0 * half_m / length);
@@ -177,12 +177,12 @@ fn segments(pair: &Pair<'_>, ha: f64, hb: f64) -> CoreGap {
     let at = &pair.at;
     let v: Vec3 = pair.rotation.column(2).into_owned();
     let flat = v.x * v.x + v.y * v.y;
-    // Seen along A only the parts across count: no cancellation however near parallel the two are.
+    // Seen along A only the components across count: no cancellation however nearly parallel the two are.
     let (mut r, mut s);
     if flat > 1e-28 {
         s = (-(at.x * v.x + at.y * v.y) / flat).clamp(-hb, hb);
     } else {
-        // Parallel: the middle of what they share.
+        // Parallel: the middle of their common range.
         let low = (-ha).max(at.z - hb);
         let high = ha.min(at.z + hb);
         s = (((low + high) / 2.0 - at.z) * v.z).clamp(-hb, hb);
@@ -196,7 +196,7 @@ fn segments(pair: &Pair<'_>, ha: f64, hb: f64) -> CoreGap {
     let (point_a, point_b) = (Vec3::new(0.0, 0.0, r), at + v * s);
     let between = point_b - point_a;
     let distance = between.norm();
-    // Where the segments cross, what is orthogonal to both is exact and the difference mostly rounding.
+    // Where the segments cross, the direction orthogonal to both is exact and the difference mostly rounding.
     let crossing = unit(&Vec3::new(-v.y, v.x, 0.0)).filter(|_| flat > 1e-28);
     let straight = unit(&between);
     let mut best = (f64::NEG_INFINITY, Vec3::x());

@@ -5,10 +5,10 @@
 //!
 //! A polytope with its corners in the Minkowski difference grows at its face nearest to the origin. `f` at that face's
 //! normal is the lower end. The upper end is minus the least plane distance over all faces: the polytope is closed and
-//! has the origin inside, so a ball of that radius fits into it, and every point of the ball is a difference of two
+//! contains the origin, so a ball of that radius fits into it, and every point of the ball is a difference of two
 //! points of the cores. Faces that look away from the origin by rounding only make that end looser, never wrong.
 //!
-//! Where the features prove a cap of directions by themselves, three corners may stand for it that need not lie in the
+//! Where the features alone prove a cap of directions, three corners may represent it that need not lie in the
 //! difference, see [`Cap::rise`](newton::Cap::rise); the upper end is then no more than the cap and those faces prove.
 //!
 //! Source: van den Bergen 2001, Proximity queries and penetration depth computation on 3D game objects.
@@ -27,17 +27,17 @@ use crate::math::Vec3;
 
 pub(super) use follow::{depth_around, depth_at};
 
-/// Growth steps: polytopes end by themselves long before, overlapping curved cores take 40 to 120.
+/// Most growth steps: polytopes finish long before, overlapping curved cores take 40 to 120.
 const STEPS_MAX: usize = 300;
-/// Faces made, at most: some half a millisecond, for a run is not interrupted.
+/// Most faces made: some half a millisecond, because a run is not interrupted.
 const FACES_MAX: usize = 2048;
-/// How many more runs.
+/// Most further runs.
 const ATTEMPTS_MAX: usize = 2;
-/// Height of the difference over a face, in parts of the smaller core, from which its features are worth a Newton run.
+/// Height of the difference over a face, as a share of the smaller core, up to which Newton is run on its features.
 const NEAR: f64 = 2e-2;
 /// Cosine between face normals beyond which a face belongs to another local optimum.
 const ANOTHER: f64 = 0.98;
-/// Lean of the ring around a closest point, at most; shallow pairs would ask for more.
+/// Greatest lean of the ring around a closest point; shallow pairs would need more.
 const RING_MAX: f64 = 0.2;
 
 thread_local! {
@@ -46,7 +46,7 @@ thread_local! {
 
 /// The gap of two cores that overlap or touch.
 ///
-/// * `warm` - what Newton made of the features of an earlier answer, if anything.
+/// * `warm` - Newton's result from the features of an earlier answer, if any.
 pub(super) fn depth(pair: &Pair<'_>, simplex: &Simplex, warm: Option<Refined>) -> CoreGap {
     let run = |polytope: &mut Polytope| {
         let upright = [Vec3::x(), Vec3::y(), Vec3::z()];
@@ -58,7 +58,7 @@ pub(super) fn depth(pair: &Pair<'_>, simplex: &Simplex, warm: Option<Refined>) -
         {
             gap = gap.meet(&other, pair);
         }
-        // A surface that breaks on slivers leaves the ends apart: other first corners make other slivers.
+        // A surface that breaks on slivers leaves the ends apart: other first corners give other slivers.
         for attempt in 0..ATTEMPTS_MAX {
             if gap.is_tight(pair) || polytope.faces.len() > FACES_MAX {
                 break;
@@ -69,7 +69,7 @@ pub(super) fn depth(pair: &Pair<'_>, simplex: &Simplex, warm: Option<Refined>) -
             let again = polytope.run(pair, &Simplex::default(), axes, None);
             gap = gjk::better(&gap, &polytope.straight(pair, again));
         }
-        // Last, for what is tight by it alone may still gain by another attempt at the other end.
+        // Last, because what is tight by this alone may still gain from another attempt at the other end.
         gap.upper = gap.upper.min((gap.point_b - gap.point_a).norm());
         gap.upper = gap.upper.max(gap.lower);
         gap
@@ -82,8 +82,8 @@ pub(super) fn depth(pair: &Pair<'_>, simplex: &Simplex, warm: Option<Refined>) -
 
 /// The upper end of the gap.
 ///
-/// * `fits` - radius of a ball around the origin that fits in; below 0 rounding told of an overlap that is none, and
-///   how far a plane is says nothing of how far its face is.
+/// * `fits` - radius of a ball around the origin that fits in; below 0, rounding reported an overlap that does not
+///   exist, and the distance of a plane does not bound that of its face.
 /// * `apart_m` - between points of the two cores.
 fn upper(fits: f64, apart_m: f64) -> f64 {
     if fits < 0.0 {
@@ -112,10 +112,10 @@ impl Best {
     }
 }
 
-/// One run: what is known so far of both ends.
+/// State of one run: what is known so far of both ends.
 struct State {
     best: Best,
-    /// What Newton found last, if it is the best.
+    /// Newton's last result, if it is the best.
     refined: Option<Refined>,
     /// Nearest face of the last step.
     nearest: usize,
@@ -141,7 +141,7 @@ impl State {
         }
     }
 
-    /// Whether a face belongs to another local optimum than the one that Newton found.
+    /// Whether a face belongs to a different local optimum than Newton's result.
     fn is_new(&self, normal: &Vec3) -> bool {
         self.refined.is_none_or(|r| r.normal.dot(normal) < ANOTHER)
     }
@@ -161,7 +161,7 @@ impl Polytope {
         self.settle(pair, warm.as_ref())
     }
 
-    /// Grows as far as it helps, around what Newton found first; the gap that is known then.
+    /// Grows as far as it helps, starting around Newton's result; returns the gap known then.
     fn settle(&mut self, pair: &Pair<'_>, warm: Option<&Refined>) -> CoreGap {
         let mut state = State::new();
         let sound = match warm {
@@ -183,7 +183,7 @@ impl Polytope {
                 held: found.held,
             };
         }
-        // Of directions that are equally good the last one has the witnesses.
+        // Among equally good directions the last one has the witnesses.
         let mut nearest = state.nearest;
         match self.faces.get(nearest) {
             Some(face) if state.last >= best.lower - pair.tiny() => best.normal = -face.normal,
@@ -205,14 +205,14 @@ impl Polytope {
             }
             let face = self.faces[place];
             state.fits = state.fits.max(face.distance);
-            // What is known may be tight already.
+            // The known bounds may be tight already.
             if -state.best.lower - face.distance <= tolerance {
                 break;
             }
             let new = pair.support(&-face.normal);
             let reach = face.normal.dot(&new.w);
             state.best.offer(-reach, &-face.normal, place);
-            // Apart, and not only by rounding: who touches is grown around.
+            // Apart, by more than rounding; cores that touch are grown around.
             if reach < -pair.tiny() {
                 break;
             }
@@ -221,7 +221,7 @@ impl Polytope {
             {
                 break;
             }
-            // A first look at the features: the closest point itself becomes a corner, which saves most of the steps.
+            // A first test of the features: the closest point itself becomes a corner, which saves most of the steps.
             if !pair.polytopes
                 && reach - face.distance <= near
                 && state.is_new(&-face.normal)
@@ -245,8 +245,8 @@ impl Polytope {
         }
     }
 
-    /// Takes in what Newton found, the closest point and a ring around it: the faces between them lean so little from
-    /// the best normal that they are within the tolerance. False when the surface broke.
+    /// Adds Newton's result, the closest point and a ring around it: the faces between them lean so little from the
+    /// best normal that they are within the tolerance. False if the surface broke.
     fn plant(&mut self, pair: &Pair<'_>, found: &Refined, state: &mut State) -> bool {
         state.best.offer(found.value, &found.normal, state.nearest);
         state.refined = Some(*found);
@@ -261,8 +261,8 @@ impl Polytope {
         })
     }
 
-    /// The answer with closest points that lie straight across from each other, where the faces have such points: the
-    /// projection onto the nearest face alone may fall outside it where several faces share a plane.
+    /// The answer with closest points opposite each other, if the faces have such points: the projection onto the
+    /// nearest face alone may fall outside it if several faces share a plane.
     fn straight(&self, pair: &Pair<'_>, gap: CoreGap) -> CoreGap {
         if gap.is_straight(pair) {
             return gap;
@@ -279,7 +279,7 @@ impl Polytope {
         }
     }
 
-    /// Witnesses, and Newton where circles take part.
+    /// Witnesses, and Newton if circles are involved.
     fn finish(&self, pair: &Pair<'_>, best: &mut Best, nearest: usize, fits: f64) -> CoreGap {
         let (mut point_a, mut point_b, weights) = self.project(nearest);
         let corners = self.faces.get(nearest).map(|face| self.corners(face));

@@ -1,4 +1,4 @@
-//! What a core shows along a direction: a polygon, a segment or a point, for clipping.
+//! The feature of a core along a direction: a polygon, a segment or a point, for clipping.
 //!
 //! In: a core and the contact normal. Out: corners in A's frame with ids, and the plane they lie in.
 
@@ -6,7 +6,7 @@ use super::pair::Pair;
 use crate::math::{Pose, Vec3, across_z};
 use crate::shape::Core;
 
-/// Corners of one feature; faces of hulls with more are thinned out (a manifold keeps four points anyway).
+/// Most corners of one feature; hull faces with more are thinned out (a manifold keeps four points anyway).
 pub(super) const CORNERS_MAX: usize = 8;
 
 /// See [`Feature::spread`].
@@ -32,7 +32,7 @@ impl Feature {
         }
     }
 
-    /// What a core shows along a direction, its own frame.
+    /// The feature of a core along a direction, its own frame.
     #[inline]
     pub(super) fn towards(core: &Core, dir: &Vec3) -> Self {
         let mut feature = Self::empty();
@@ -40,7 +40,7 @@ impl Feature {
         feature
     }
 
-    /// The same of a core at a pose, seen from outside.
+    /// The same for a core at a pose, in the outer frame.
     pub(super) fn seen(core: &Core, pose: &Pose, dir: &Vec3) -> Self {
         let mut feature = Self::towards(core, &pose.inverse_transform_vector(dir));
         for corner in &mut feature.corners[..feature.count] {
@@ -50,13 +50,13 @@ impl Feature {
         feature
     }
 
-    /// What A shows towards B.
+    /// The feature of A towards B.
     #[inline]
     pub(super) fn of_a(pair: &Pair<'_>, normal: &Vec3) -> Self {
         Self::towards(pair.a.core(), normal)
     }
 
-    /// What B shows towards A, in A's frame.
+    /// The feature of B towards A, in A's frame.
     #[inline]
     pub(super) fn of_b(pair: &Pair<'_>, normal: &Vec3) -> Self {
         let mut feature = Self::towards(pair.b.core(), &-pair.to_b(normal));
@@ -80,8 +80,8 @@ impl Feature {
         self.normal.dot(normal).abs()
     }
 
-    /// The same, larger by what rounding may take away at its rim: a corner over an edge of two neighbours is over
-    /// both.
+    /// The same feature, enlarged by what rounding may take away at its rim: a corner over the common edge of two
+    /// neighbours is over both.
     pub(super) fn spread(&self) -> Self {
         let middle = self.used().iter().sum::<Vec3>() / self.count.max(1) as f64;
         let corners = self.corners.map(|p| p + (p - middle) * RIM);
@@ -96,7 +96,7 @@ impl Feature {
         }
     }
 
-    /// False, and nothing is taken, for a triangle without an area.
+    /// Returns false, and adds nothing, for a triangle without an area.
     fn fill_triangle(&mut self, corners: &[Vec3; 3]) -> bool {
         let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
         let length = normal.norm();
@@ -176,7 +176,7 @@ impl Feature {
         self.push(corner, id & 0x7fff);
     }
 
-    /// The face of a box that looks most along `dir`.
+    /// The face of a box whose normal is closest to `dir`.
     fn cuboid_face(&mut self, half: &Vec3, dir: &Vec3) {
         let k = dir.iamax();
         let (i, j) = ((k + 1) % 3, (k + 2) % 3);
@@ -197,7 +197,7 @@ impl Feature {
     /// The regular octagon in a circle, one corner at the circle's deepest point.
     fn cap(&mut self, radius_m: f64, z_m: f64, dir: &Vec3, up: f64) {
         let off = across_z(dir);
-        // Lying flat there is no deepest point, and a fixed start keeps the ids still.
+        // Lying flat, there is no deepest point; a fixed start keeps the ids constant.
         let (x, y) = if off > 1e-3 {
             (radius_m * dir.x / off, radius_m * dir.y / off)
         } else {

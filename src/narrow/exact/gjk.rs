@@ -10,10 +10,10 @@ use super::pair::{CoreGap, Held, Pair, Vertex, unit};
 use super::simplex::Simplex;
 use crate::math::Vec3;
 
-/// Steps of one run; polytopes of a few hundred vertices take under 20, curved cores that touch up to 60.
+/// Most steps of one run; polytopes of a few hundred vertices take under 20, curved cores that touch up to 60.
 const STEPS_MAX: usize = 64;
 
-/// What came out.
+/// The outcome of a run.
 #[allow(
     clippy::large_enum_variant,
     reason = "lives on the stack for one query"
@@ -21,7 +21,7 @@ const STEPS_MAX: usize = 64;
 pub(super) enum Outcome {
     /// The cores are apart.
     Apart(CoreGap),
-    /// They overlap, or touch to the last bit; with what the simplex proves, which is no depth.
+    /// They overlap, or touch to the last bit; with what the simplex proves, which is not a depth.
     Overlap(Simplex, CoreGap),
 }
 
@@ -29,7 +29,7 @@ pub(super) enum Outcome {
 struct Gjk<'a> {
     pair: &'a Pair<'a>,
     simplex: Simplex,
-    /// Next direction to ask.
+    /// Next direction to query.
     dir: Vec3,
     point: Vec3,
     upper: f64,
@@ -39,14 +39,14 @@ struct Gjk<'a> {
 
 enum Run {
     Overlap,
-    /// Within the tolerance, or no step helps any more.
+    /// Within the tolerance, or no further step helps.
     Ended,
 }
 
 /// The distance of two cores, or the verdict that they overlap.
 ///
-/// * `held` - what an earlier answer with the normal `start` rested on.
-/// * `warm` - what Newton made of it, if anything.
+/// * `held` - the features of an earlier answer with the normal `start`.
+/// * `warm` - Newton's result from them, if any.
 pub(super) fn distance(
     pair: &Pair<'_>,
     start: &Vec3,
@@ -76,7 +76,7 @@ pub(super) fn distance(
             Run::Ended => gjk.decide(gjk.gap()),
         };
     }
-    // Curved: roughly first, then Newton on the features found; what is still loose goes round again.
+    // Curved: roughly first, then Newton on the features found; if still loose, another round.
     let mut best: Option<CoreGap> = None;
     let mut hint = None;
     let size = pair.a.reach().min(pair.b.reach());
@@ -99,7 +99,7 @@ pub(super) fn distance(
     gjk.decide(best.unwrap_or_else(|| gjk.gap()))
 }
 
-/// The tighter end of each; witnesses follow the upper end, the normal the lower.
+/// The tighter of both for each end; witnesses follow the upper end, the normal the lower.
 pub(super) fn better(one: &CoreGap, other: &CoreGap) -> CoreGap {
     let (low, high) = (
         if other.lower >= one.lower { other } else { one },
@@ -113,7 +113,7 @@ pub(super) fn better(one: &CoreGap, other: &CoreGap) -> CoreGap {
 }
 
 impl Gjk<'_> {
-    /// Where no direction separates, the polytope has to tell: the simplex may have stalled around the origin.
+    /// If no direction separates, the polytope must decide: the simplex may have stalled around the origin.
     fn decide(&self, gap: CoreGap) -> Outcome {
         if gap.lower < -self.pair.tiny() {
             Outcome::Overlap(self.simplex, gap)
@@ -122,14 +122,14 @@ impl Gjk<'_> {
         }
     }
 
-    /// Begins with the simplex of an earlier answer, as far as it is closer to the origin than its first vertex.
+    /// Begins with the simplex of an earlier answer, as long as that is closer to the origin than its first vertex.
     fn recall(&mut self, held: &Held) {
         let normal = self.dir;
         for vertex in self.pair.recall(held, &normal) {
             if self.simplex.used().iter().any(|v| v.w == vertex.w) {
                 continue;
             }
-            // Around the origin already: the run begins afresh and meets that verdict again.
+            // Already around the origin: the run starts from scratch and will reach that verdict again.
             if matches!(self.add(vertex), Some(Run::Overlap)) {
                 *self = Self {
                     simplex: Simplex::default(),
@@ -143,7 +143,7 @@ impl Gjk<'_> {
     }
 
     fn run(&mut self, tolerance: f64, hint: Option<Vec3>) -> Run {
-        // What Newton found is asked first; it may add nothing.
+        // Newton's result is queried first; it may add nothing.
         if let Some(hint) = hint {
             let asked = self.ask(&hint);
             if let Some(new) = asked
@@ -168,7 +168,7 @@ impl Gjk<'_> {
         Run::Ended
     }
 
-    /// Asks one direction; `None` when the simplex has that vertex already.
+    /// Queries one direction; `None` if the simplex already has that vertex.
     fn ask(&mut self, dir: &Vec3) -> Option<Vertex> {
         let new = self.pair.support(dir);
         let lower = dir.dot(&new.w);
@@ -180,7 +180,7 @@ impl Gjk<'_> {
         (!known).then_some(new)
     }
 
-    /// Puts a vertex in; `Some` when that ends the run.
+    /// Adds a vertex; `Some` if that ends the run.
     fn add(&mut self, new: Vertex) -> Option<Run> {
         let tiny = self.pair.tiny() / 4.0;
         self.simplex.push(new);
@@ -190,7 +190,7 @@ impl Gjk<'_> {
         };
         let dir = self.simplex.direction(&nearest);
         let (Some(dir), true) = (dir, nearest.square > tiny * tiny) else {
-            // Too close to tell.
+            // Too close to distinguish.
             self.simplex.keep(&nearest);
             return Some(Run::Overlap);
         };
@@ -204,15 +204,15 @@ impl Gjk<'_> {
         None
     }
 
-    /// Of cores that overlap: their points at the origin are as good as one, and the best direction proves how far they
-    /// overlap at most.
+    /// For cores that overlap: their points at the origin coincide, and the best direction proves how far they overlap
+    /// at most.
     fn touch(&self) -> CoreGap {
         self.between(self.lower, self.normal)
     }
 
     fn gap(&self) -> CoreGap {
         let (mut lower, mut normal) = (self.lower, self.normal);
-        // The last direction of the simplex and the one straight to the point were perhaps not asked yet.
+        // The last direction of the simplex and the one straight to the point may not have been queried yet.
         if self.upper - lower > self.pair.tiny() {
             let asked = [Some(self.dir), unit(&self.point)];
             for dir in asked.into_iter().flatten() {
@@ -225,7 +225,7 @@ impl Gjk<'_> {
         self.between(lower, normal)
     }
 
-    /// From what a direction proves to the points of the simplex.
+    /// The gap between what a direction proves and the points of the simplex.
     fn between(&self, lower: f64, normal: Vec3) -> CoreGap {
         let (point_a, point_b) = self.simplex.witnesses();
         CoreGap {

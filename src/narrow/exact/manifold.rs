@@ -1,10 +1,10 @@
-//! Manifolds: up to four contact points that span what two shapes share, with ids that stay while the features do.
+//! Manifolds: up to four contact points that span what two shapes share, with ids that persist as long as the features.
 //!
-//! In: a pair and its exact answer. Out: points in A's frame, none deeper than the answer but for rounding.
+//! In: a pair and its exact answer. Out: points in A's frame, none deeper than the answer, up to rounding.
 //!
 //! Each core shows a feature along the normal: a polygon (box face, hull face, cap, base), a segment (side line,
-//! capsule axis) or a point. The one is clipped by planes that stand along the normal on the edges of the other;
-//! gaps are measured along the normal. The deepest point is always among those that come out.
+//! capsule axis) or a point. One is clipped by planes along the normal through the edges of the other; gaps are
+//! measured along the normal. The deepest point is always among the results.
 
 mod clipped;
 mod lathe;
@@ -28,15 +28,15 @@ use crate::shape::Core;
 
 /// Faces that lean further from the normal than this (cosine) share no patch worth clipping.
 const FACING: f64 = 0.7;
-/// Cosine by which B's face has to look more along the normal than A's to be the one that is clipped onto: of faces
-/// that lie flat on one another rounding does not choose, for the names of the points hang on it.
+/// How much closer (cosine) B's face must be to the normal than A's to become the reference face: for faces that lie
+/// flat on one another rounding must not decide, because the names of the points depend on it.
 const RATHER: f64 = 1e-9;
-/// Points so far apart still count as contacts, as a share of the smaller one's radius: of a body at rest all corners
-/// do, though rounding lifts some.
+/// Points this far apart still count as contacts, as a share of the smaller one's radius: for a body at rest all
+/// corners must, though rounding lifts some.
 pub(in crate::narrow) const PREDICTION: f64 = 1e-6;
-/// Points nearer than this share of the smaller one's radius, and what is rounded, are one.
+/// Points nearer than this share of the smaller one's radius, plus rounding, are merged.
 const SAME: f64 = 1e-6;
-/// Id of the closest points themselves, where no clipped point stands for them.
+/// Id of the closest points themselves, if no clipped point represents them.
 const WITNESS: u32 = 0x7fff_ffff;
 
 /// One contact point.
@@ -99,8 +99,8 @@ pub fn manifold(
     Found::of(&pair, closest, prediction_m).write(out);
 }
 
-/// Hands over all contact points of two shapes that touch, up to 16: which four are kept is decided by who knows which
-/// were kept before. As [`manifold`] else; points up to [`PREDICTION`] apart count.
+/// Passes on all contact points of two shapes that touch, up to 16: the caller knows which were kept before, and
+/// chooses four. Otherwise as [`manifold`]; points up to [`PREDICTION`] apart count.
 pub(in crate::narrow) fn touching_points(
     a: &Convex,
     b: &Convex,
@@ -116,8 +116,8 @@ pub(in crate::narrow) fn touching_points(
     }
 }
 
-/// The middle of what two cores share along `normal` once B has moved out by `-gap`: clipped features, least points
-/// only. `None` where they show no faces to clip.
+/// The middle of what two cores share along `normal` once B has moved out by `-gap`: clipped features, only the deepest
+/// points. `None` if they show no faces to clip.
 pub(super) fn deepest_shared(pair: &Pair<'_>, normal: &Vec3, gap: f64) -> Option<(Vec3, Vec3)> {
     let of_a = Feature::of_a(pair, normal);
     let of_b = Feature::of_b(pair, normal);
@@ -160,9 +160,9 @@ struct Found {
     surfaces: [Surface; 2],
     prediction_m: f64,
     witness: ManifoldPoint,
-    /// Points so near are one, metres.
+    /// Points closer than this are merged, metres.
     same: f64,
-    /// The answer's own point is deeper than another by so much only where it is another, metres.
+    /// The answer's own point must be deeper than another by this to count as a separate point, metres.
     deeper: f64,
 }
 
@@ -199,7 +199,7 @@ impl Found {
         }
     }
 
-    /// All points of a pair that the features along the answer's normal share.
+    /// All points that the features along the answer's normal share.
     fn of(pair: &Pair<'_>, closest: &Closest, prediction_m: f64) -> Self {
         let normal = closest.normal;
         let mut found = Self::new(pair, closest, prediction_m);
@@ -220,7 +220,7 @@ impl Found {
         found
     }
 
-    /// Takes a pair of points of the cores, out to the surfaces; none where there is no surface along the normal.
+    /// Adds a pair of points of the cores, moved out to the surfaces; nothing if there is no surface along the normal.
     fn take(&mut self, a: &Vec3, b: &Vec3, feature: u32) {
         let [of_a, of_b] = &self.surfaces;
         let (Some(out_a), Some(out_b)) = (
@@ -248,7 +248,7 @@ impl Found {
         }
     }
 
-    /// All that were found, and the answer's own where none is as deep.
+    /// All points found, plus the answer's own if none is as deep.
     fn all(&mut self) -> &[ManifoldPoint] {
         let deepest = self.points[..self.count]
             .iter()
@@ -261,7 +261,7 @@ impl Found {
         &self.points[..self.count]
     }
 
-    /// At most four: the deepest, the farthest from it, and the two that span the most area.
+    /// At most four: the deepest, the farthest from it, and the two that span the largest area.
     fn write(&mut self, out: &mut Manifold) {
         let normal = self.normal;
         let points = self.all();
@@ -299,7 +299,7 @@ fn spread(points: &[ManifoldPoint], normal: &Vec3, chosen: &mut [usize; MANIFOLD
     let side = normal.cross(&along);
     chosen[2] = best(&|k| side.dot(&(at(k) - first)));
     chosen[3] = best(&|k| -side.dot(&(at(k) - first)));
-    // All on one line: what is doubled is replaced by whatever is left.
+    // All collinear: duplicates are replaced by any remaining point.
     for k in 2..MANIFOLD_POINTS_MAX {
         if chosen[..k].contains(&chosen[k]) {
             let free = (0..points.len()).find(|j| !chosen[..k].contains(j));
@@ -308,7 +308,7 @@ fn spread(points: &[ManifoldPoint], normal: &Vec3, chosen: &mut [usize; MANIFOLD
     }
 }
 
-/// Clips `incident` by the planes along the normal on the edges of `base`, and casts what is left onto `base`'s plane.
+/// Clips `incident` by the planes along the normal through `base`'s edges, and projects the rest onto `base`'s plane.
 fn clip_onto(
     base: &Feature,
     incident: &Feature,
@@ -333,7 +333,7 @@ fn clip_onto(
     }
 }
 
-/// Two lines that run side by side: the ends of what they share.
+/// Two nearly parallel lines: the ends of their common range.
 fn overlap_lines(of_a: &Feature, of_b: &Feature, normal: &Vec3, found: &mut Found) {
     let (a, b) = (of_a.used(), of_b.used());
     let along = a[1] - a[0];
@@ -341,7 +341,7 @@ fn overlap_lines(of_a: &Feature, of_b: &Feature, normal: &Vec3, found: &mut Foun
     let flat = |v: Vec3| v - normal * v.dot(normal);
     let (along_flat, other_flat) = (flat(along), flat(other));
     let (square, size) = (along_flat.norm_squared(), other_flat.norm());
-    // Lines that cross at a real angle meet in one point, which the witness is.
+    // Lines that cross at a real angle meet in one point, which is the witness.
     if along_flat.cross(&other_flat).norm() > 0.1 * square.sqrt() * size
         || square == 0.0
         || size == 0.0
@@ -358,7 +358,7 @@ fn overlap_lines(of_a: &Feature, of_b: &Feature, normal: &Vec3, found: &mut Foun
         let on_b = (s - place[0]) / span;
         #[allow(clippy::cast_possible_truncation, reason = "0 or 1")]
         let k32 = k as u32;
-        // The far point is put straight across, and back onto its side: the lines may lean a little against each other.
+        // The far point is placed opposite, and moved back onto its side: the lines may be slightly skew.
         if (0.0..=1.0).contains(&on_b) {
             let end = a[0] + along * s;
             let far = end + normal * normal.dot(&(b[0] + other * on_b - end));

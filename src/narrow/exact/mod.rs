@@ -7,22 +7,22 @@
 //! radii, so all work is on cores. Every core is the hull of vertices and circles.
 //! * Point and segment pairs, and a point against anything, have closed forms (`closed`).
 //! * Two boxes try their separating axes (`sat`) first.
-//! * Else GJK (`gjk`) finds the features that are closest, or that the cores overlap; then an expanding polytope
-//!   (`epa`) gives the least translation, or planes through an axis do, where two axes nearly agree (`revolved`) or one
-//!   core reaches less far from the axis of a round one than would show its rim (`sectors`).
-//! * Slivers that are apart by less than the rounding of those methods are parted by planes along their edges (`part`).
-//! * Where a circle takes part both stop early and a Newton method on the features (`newton`) finishes: it finds the
-//!   normal that makes `f` greatest, outside and inside alike. It starts from the features of the last answer, and
-//!   where it says that they overlap the polytope begins around its closest point, without GJK, or under a cap of
-//!   directions that the features themselves say are no better, which takes the place of its finest faces.
-//! * Of a pair that is asked in every tick the whole surface of the polytope is kept ([`Shell`]), and at the next poses
-//!   mostly proves the depth as it is.
+//! * Otherwise GJK (`gjk`) finds the closest features, or that the cores overlap. For the least translation an
+//!   expanding polytope (`epa`) follows, or planes through an axis if two axes nearly agree (`revolved`) or one core is
+//!   too close to the axis of a round one for the rim to matter (`sectors`).
+//! * Slivers apart by less than the rounding of those methods are separated by planes along their edges (`part`).
+//! * With circles, both stop early and a Newton method on the features (`newton`) finishes: it finds the normal that
+//!   maximises `f`, outside and inside alike. It starts from the features of the last answer. If these overlap, the
+//!   polytope begins around its closest point, without GJK, or under a cap of directions that the features prove to be
+//!   no better, which replaces its finest faces.
+//! * For a pair that is queried in every tick the polytope's whole surface is kept ([`Shell`]); at the next poses it
+//!   usually proves the depth as it is.
 //!
 //! The certificate: for every unit `n`, `f(n) = -(s_A(n) + s_B(-n))` is a lower bound on the gap, so the lower end is
-//! `f` at the best normal found, whoever found it. The upper end is the distance of two points that are convex
+//! `f` at the best normal, however it was found. The upper end is the distance of two points that are convex
 //! combinations of points of the shapes, or minus the radius of a ball that fits into a polytope inscribed in the
-//! Minkowski difference, or into the difference by what its features say within a cap. Both are widened by `Pair::pad`,
-//! which takes up every rounding from the quaternion on.
+//! Minkowski difference, or into the difference as its features prove within a cap. Both are widened by `Pair::pad`,
+//! which covers every rounding from the quaternion on.
 //!
 //! Refused: parry's own queries on this path. Their tolerances are absolute (the answer depends on the unit of
 //! length), coincident shapes come back with depth 0, and curved pairs stop at 1e-7; here every tolerance is a
@@ -55,18 +55,18 @@ use newton::Refined;
 use pair::{CoreGap, Held, Pair};
 pub use polytope::Shell;
 
-/// Warm start of one shape pair: the normal found last and the features it rested on. The default knows nothing.
+/// Warm start of one shape pair: the last normal and its features. The default knows nothing.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Warm {
     /// Unit, A's frame; zero when nothing is known.
     normal: Vec3,
-    /// Ids only: one that the shape does not have is skipped, so a warm start of another shape costs time, no truth.
+    /// Ids only: one that the shape does not have is skipped, so a warm start of another shape only costs time.
     held: Held,
 }
 
 const _: () = assert!(size_of::<Warm>() <= 64, "one is kept for every pair");
 
-/// What an exact query yields, in A's frame.
+/// The result of an exact query, in A's frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Closest {
     /// Certified interval of the gap, metres: distance, or minus the least translation that separates.
@@ -79,12 +79,12 @@ pub struct Closest {
     pub point_a: Point,
     /// On the surface of B; `point_b - point_a = best_m * normal`.
     pub point_b: Point,
-    /// Whether the interval is as narrow as the method is meant to make it. It is sound in any case.
+    /// Whether the interval is as narrow as the method can make it. It is sound in any case.
     pub finished: bool,
 }
 
 impl Closest {
-    /// Nothing is known: a pose that is not finite.
+    /// Nothing is known: for a pose that is not finite.
     #[must_use]
     pub fn unknown() -> Self {
         Self {
@@ -103,7 +103,7 @@ impl Closest {
         self.gap.max <= 0.0 || (self.finished && self.gap.min <= 0.0)
     }
 
-    /// The same answer with the roles of A and B changed; still in the same frame.
+    /// The same answer with A and B exchanged; still in the same frame.
     #[must_use]
     pub fn swapped(&self) -> Self {
         Self {
@@ -115,12 +115,12 @@ impl Closest {
     }
 }
 
-/// Width up to which an interval counts as finished, in parts of the pair's size (radii of both shapes and the distance
-/// of their middles). Curved pairs that overlap end at 1e-7, everything else near 1e-14 of the numbers that they are
-/// told by.
+/// Width up to which an interval counts as finished, as a share of the pair's size (radii of both shapes and the
+/// distance of their middles). Curved pairs that overlap end at 1e-7, all others near 1e-14 of their coordinates'
+/// magnitude.
 const FINISHED: f64 = 1e-6;
-/// The same in parts of what is allowed for rounding, twice of which is in every interval: a hull that is told by
-/// numbers far from its origin may be smaller than what is rounded of them.
+/// The same in multiples of the rounding allowance, twice of which is in every interval: a hull with coordinates far
+/// from its origin may be smaller than their rounding.
 const FINISHED_PADS: f64 = 16.0;
 
 /// The gap of two convex shapes, with its certificate.
@@ -137,11 +137,11 @@ pub fn convex_gap(a: &Convex, b: &Convex, pos12: &Pose, warm: &mut Warm) -> Clos
     gap(a, b, pos12, warm, None)
 }
 
-/// As [`convex_gap`], of a pair that is asked in every tick: where curved cores or hulls overlap and move by 0.1 % of
+/// As [`convex_gap`], for a pair that is queried in every tick: if curved cores or hulls overlap and move by 0.1 % of
 /// their size from query to query it takes about half the time, at 1 % three quarters.
 ///
-/// * `shell` - kept by the caller for this pair, as `warm` is: any is sound, an empty one will do. It is filled where
-///   the pair overlaps and a polytope tells how deep, and emptied where not.
+/// * `shell` - kept by the caller for this pair, as `warm` is: any is sound, an empty one will do. It is filled if the
+///   pair overlaps and a polytope finds the depth, and emptied otherwise.
 #[must_use]
 pub fn convex_gap_along(
     a: &Convex,
@@ -169,7 +169,7 @@ fn gap(
     if !pair.scale.is_finite() {
         return Closest::unknown();
     }
-    // Closed forms begin from nothing, and leave nothing behind.
+    // Closed forms need no warm start, and leave none.
     if let Some(core) = closed::gap(&pair) {
         return finish(&pair, &core, core.along());
     }
@@ -178,8 +178,8 @@ fn gap(
         normal: core.normal,
         held: core.held,
     };
-    // Where a whole arc of directions is as good as the best a polytope comes to no end, and the points of its faces
-    // are off by as much as its own end is: then the other end is the nearer one.
+    // If a whole arc of directions is as good as the best, a polytope does not converge, and the points of its faces
+    // are off by as much as its own end: then the other end is the nearer one.
     let estimate = if core.upper < -pair.tiny() {
         core.lower
     } else {
@@ -200,7 +200,7 @@ fn iterate(pair: &Pair<'_>, warm: &Warm, mut shell: Option<&mut Shell>) -> CoreG
         Some(sat::Axes::Apart(normal)) => normal,
         None => start,
     };
-    // The features of the last answer are mostly those of this one.
+    // The features of the last answer are usually those of this one.
     let refined = if pair.polytopes {
         if let Some(gap) = epa::depth_at(pair, &warm.held, &start, shell.as_deref_mut()) {
             return gap;
@@ -225,7 +225,7 @@ fn iterate(pair: &Pair<'_>, warm: &Warm, mut shell: Option<&mut Shell>) -> CoreG
                 Some(gap) => gjk::better(&gap, &epa::depth(pair, &simplex, refined)),
                 None => epa::depth(pair, &simplex, refined),
             };
-            // A polytope that only touches the origin may break before it tells anything: they touch all the same.
+            // A polytope that only touches the origin may break before it has any result: they touch all the same.
             if touch.upper < gap.upper {
                 CoreGap {
                     held: gap.held,
@@ -238,7 +238,7 @@ fn iterate(pair: &Pair<'_>, warm: &Warm, mut shell: Option<&mut Shell>) -> CoreG
     }
 }
 
-/// By planes through an axis, where that takes less time than a polytope.
+/// By planes through an axis, if that takes less time than a polytope.
 fn around(pair: &Pair<'_>, warm: Option<&Refined>) -> Option<CoreGap> {
     let gap = revolved::gap(pair, warm);
     if gap.is_some_and(|gap| gap.is_tight(pair)) {
@@ -250,7 +250,7 @@ fn around(pair: &Pair<'_>, warm: Option<&Refined>) -> Option<CoreGap> {
     }
 }
 
-/// From the gap of the cores, of which there is an estimate, to that of the shapes.
+/// From the gap of the cores, with its estimate, to that of the shapes.
 fn finish(pair: &Pair<'_>, core: &CoreGap, estimate: f64) -> Closest {
     let (ra, rb) = (pair.a.margin(), pair.b.margin());
     let margins = ra + rb;
@@ -258,7 +258,7 @@ fn finish(pair: &Pair<'_>, core: &CoreGap, estimate: f64) -> Closest {
     let low = (core.lower - margins - pad).next_down();
     let high = (core.upper - margins + pad).next_up().max(low);
     let best_m = (estimate - margins).clamp(low, high);
-    // Straight across from each other; where a method ends at 1e-7 the points give way by as much.
+    // Opposite each other; where a method ends at 1e-7 the points are moved by as much.
     let middle = (core.point_a + core.point_b) / 2.0;
     let half = core.normal * ((best_m + margins) / 2.0);
     let (core_a, core_b) = (middle - half, middle + half);

@@ -1,7 +1,7 @@
-//! Newton on the features: the normal that makes `f` greatest, once it is known which vertices and circles take part.
+//! Newton on the features: the normal that maximises `f`, once the active vertices and circles are known.
 //!
 //! In: the vertices of the last simplex or face, their weights, a normal near the best one. Out: a better normal and
-//! witnesses, to ten and more digits after two or three steps, apart and overlapping alike.
+//! witnesses, to ten and more digits after two or three steps, for cores apart and overlapping alike.
 //!
 //! Each pair of elements `i` (a vertex or circle of A and one of B) has `f_i(n) = n . w_i(n)`, smooth, with the
 //! support point `w_i` as gradient, and `f = min f_i`. At the best unit `n` the active ones are equal and
@@ -19,16 +19,16 @@ use crate::math::Vec3;
 pub(super) use cap::Cap;
 use set::{Active, Set};
 
-/// Newton steps of one active set; convergence is quadratic, so more means that it does not converge.
+/// Most Newton steps of one active set; convergence is quadratic, so more means that it does not converge.
 const STEPS_MAX: usize = 10;
-/// Changes of the active set.
+/// Most changes of the active set.
 const SETS_MAX: usize = 4;
-/// A tangent step that is the last one.
+/// A shorter tangent step is the last one.
 const STEP_LENGTH_MIN: f64 = 3e-9;
-/// A tangent step longer than this leaves the region in which the model is meant.
+/// A tangent step longer than this leaves the region in which the model is valid.
 const STEP_LENGTH_MAX: f64 = 0.5;
 
-/// What the method ended at.
+/// The result of the method.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Refined {
     /// Unit, A to B.
@@ -39,9 +39,9 @@ pub(super) struct Refined {
     pub(super) point_a: Vec3,
     /// Convex combination of points of B.
     pub(super) point_b: Vec3,
-    /// The elements that take part.
+    /// The active elements.
     pub(super) held: Held,
-    /// Around the normal of cores that overlap, where the elements say so much.
+    /// Around the normal of cores that overlap, if the elements prove one.
     pub(super) cap: Option<Cap>,
 }
 
@@ -58,7 +58,7 @@ impl Refined {
         }
     }
 
-    /// The closest point of the difference; it lies on no one element.
+    /// The closest point of the difference; it lies on no single element.
     pub(super) fn corner(&self) -> Vertex {
         Vertex {
             w: self.point_b - self.point_a,
@@ -75,7 +75,7 @@ pub(super) fn refine(pair: &Pair<'_>, simplex: &Simplex, normal: &Vec3) -> Optio
     Some(solve(pair, simplex.used(), &simplex.weights, normal)?.apart())
 }
 
-/// A better answer than an earlier one, from the features it rested on.
+/// A better answer than an earlier one, from that one's features.
 pub(super) fn resume(pair: &Pair<'_>, held: &Held, normal: &Vec3) -> Option<Refined> {
     let mut set = Set::default();
     for ((of_a, of_b), weight) in held
@@ -92,7 +92,7 @@ pub(super) fn resume(pair: &Pair<'_>, held: &Held, normal: &Vec3) -> Option<Refi
     climb(pair, &mut set, normal)
 }
 
-/// The local greatest `f` near `normal`, with the features of the given vertices; `None` when it does not converge.
+/// The local maximum of `f` near `normal`, with the features of the given vertices; `None` if it does not converge.
 pub(super) fn solve(
     pair: &Pair<'_>,
     vertices: &[Vertex],
@@ -128,7 +128,7 @@ fn climb(pair: &Pair<'_>, set: &mut Set, normal: &Vec3) -> Option<Refined> {
     best
 }
 
-/// Newton steps with one active set, which may lose members.
+/// Newton steps with one active set, which may lose elements.
 fn converge(pair: &Pair<'_>, set: &mut Set, start: &Vec3) -> Option<Refined> {
     let mut n = *start;
     let mut last = f64::INFINITY;
@@ -148,7 +148,7 @@ fn converge(pair: &Pair<'_>, set: &mut Set, start: &Vec3) -> Option<Refined> {
             continue;
         }
         n = unit(&(n + e1 * dx + e2 * dy))?;
-        // Convergence is quadratic: what is left is the square of this step, or rounding.
+        // Convergence is quadratic: the remaining error is the square of this step, or rounding.
         if length < STEP_LENGTH_MIN || (length < 1e-7 && length >= last / 2.0) {
             break;
         }
@@ -169,13 +169,13 @@ fn converge(pair: &Pair<'_>, set: &mut Set, start: &Vec3) -> Option<Refined> {
 
 /// One Newton step: tangent coordinates and the change of each weight.
 ///
-/// The active values are to become equal, which is one line of two coordinates for each member but the first, and the
-/// tangent part of `sum(l_i w_i)` is to become 0. So with three members the lines alone tell where to go, with two they
-/// leave one coordinate to the curvature, with one both.
+/// The active values are to become equal, which gives one linear equation in two coordinates for each element except
+/// the first, and the tangent part of `sum(l_i w_i)` is to become 0. So with three elements the equations alone
+/// determine the step, with two they leave one coordinate to the curvature, with one both.
 fn step(set: &Set) -> Option<(f64, f64, [f64; 3])> {
     let actives = &set.actives[..set.count];
     let first = actives.first()?;
-    // What bends, and what is left of the slopes.
+    // The sum of curvatures, and the residual of the slopes.
     let (mut bend, mut rest) = ([0.0; 3], [0.0; 2]);
     let mut mean = 0.0;
     for x in actives {
@@ -207,7 +207,7 @@ fn step(set: &Set) -> Option<(f64, f64, [f64; 3])> {
         [_, second] => {
             let (slope, ahead) = line(second);
             let square = slope[0] * slope[0] + slope[1] * slope[1];
-            // Along the slope as far as the line says, across it as far as the curvature does.
+            // Along the slope by the linear equation, across it by the curvature.
             let along = [slope[0] * ahead / square, slope[1] * ahead / square];
             let across = [-slope[1], slope[0]];
             let left = bent(along);
@@ -231,7 +231,7 @@ fn step(set: &Set) -> Option<(f64, f64, [f64; 3])> {
     finite.then_some((d[0], d[1], change))
 }
 
-/// Two lines with two unknowns; `None` when singular.
+/// Two linear equations in two unknowns; `None` if singular.
 fn solve_two(m: [[f64; 2]; 2], right: [f64; 2]) -> Option<[f64; 2]> {
     let swap = m[0][0].abs() < m[1][0].abs();
     let ([a, b], [c, d]) = if swap { (m[1], m[0]) } else { (m[0], m[1]) };

@@ -1,4 +1,4 @@
-//! Two cores in one frame: the Minkowski difference B - A that every method here walks on.
+//! Two cores in one frame: the Minkowski difference B - A that every method here works on.
 //!
 //! In: two shapes and the pose of B seen from A. Out: supports of the difference, and the rounding to allow for.
 
@@ -7,8 +7,8 @@ use nalgebra::Matrix3;
 use crate::math::{Pose, Vec3, f32_down};
 use crate::shape::Convex;
 
-/// A point of the Minkowski difference with the points it comes from, A's frame; or one that stands for what lies
-/// around it, which comes from no points.
+/// A point of the Minkowski difference with the points it comes from, A's frame; or one that represents its
+/// surroundings, and comes from no points.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Vertex {
     /// `b - a`.
@@ -23,8 +23,8 @@ pub(super) struct Vertex {
     pub(super) of_b: u32,
 }
 
-/// The element of a point that lies on no single one. Not to be asked of a core, which gives some element for any
-/// number.
+/// The element of a point that lies on no single one. Not valid as a query of a core, which returns some element for
+/// any number.
 pub(super) const NO_ELEMENT: u32 = u32::MAX >> 1;
 
 impl Vertex {
@@ -34,7 +34,7 @@ impl Vertex {
     }
 }
 
-/// Which elements an answer rests on: enough to begin from there the next time.
+/// The elements behind an answer: enough to begin from there the next time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Held {
     /// Element of A, element of B.
@@ -65,12 +65,12 @@ impl Held {
     }
 }
 
-/// What a method found out about two cores.
+/// The result of a method for two cores.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CoreGap {
-    /// `f(normal)` as computed: the gap is not below it, but for [`Pair::pad`].
+    /// `f(normal)` as computed: the gap is not below it, up to [`Pair::pad`].
     pub(super) lower: f64,
-    /// The gap is not above it, but for [`Pair::pad`].
+    /// The gap is not above it, up to [`Pair::pad`].
     pub(super) upper: f64,
     /// Unit, A to B.
     pub(super) normal: Vec3,
@@ -78,34 +78,34 @@ pub(super) struct CoreGap {
     pub(super) point_a: Vec3,
     /// On the core of B; `point_b - point_a` is the gap times the normal.
     pub(super) point_b: Vec3,
-    /// What to begin from the next time.
+    /// The start of the next query.
     pub(super) held: Held,
 }
 
-/// Width at which curved cores end, in parts of the size; polytopes end at roundoff.
+/// Width at which curved cores stop, as a share of the size; polytopes stop at roundoff.
 const CURVED: f64 = 5e-8;
-/// Width from which more work is worth its time, in parts of the size.
+/// Width from which more work is worthwhile, as a share of the size.
 const LOOSE: f64 = 5e-7;
-/// Closest points that are further than this from straight across are looked for anew, in parts of the size.
+/// Closest points displaced from the normal by more than this are searched again, as a share of the size.
 const STRAIGHT: f64 = 1e-7;
 
 impl CoreGap {
-    /// Whether both ends are as close as curved cores are asked for.
+    /// Whether both ends are as close as curved cores require.
     pub(super) fn is_tight(&self, pair: &Pair<'_>) -> bool {
         self.upper - self.lower <= pair.share(LOOSE)
     }
 
-    /// How far the closest points are apart along the normal, metres.
+    /// Distance of the closest points along the normal, metres.
     pub(super) fn along(&self) -> f64 {
         self.normal.dot(&(self.point_b - self.point_a))
     }
 
-    /// How far the closest points are from straight across from each other, metres.
+    /// Displacement of the closest points from being opposite along the normal, metres.
     pub(super) fn off(&self) -> f64 {
         (self.point_b - self.point_a - self.normal * self.lower).norm()
     }
 
-    /// What two answers know of cores that overlap: normal and points of the other where its normal is better.
+    /// Combines two answers for cores that overlap: normal and points of the other if its normal is better.
     pub(super) fn meet(&self, other: &Self, pair: &Pair<'_>) -> Self {
         let better = if other.lower > self.lower + pair.tiny() {
             other
@@ -132,7 +132,7 @@ pub(super) struct Pair<'a> {
     pub(super) rotation: Matrix3<f64>,
     /// Origin of B, A's frame.
     pub(super) at: Vec3,
-    /// How far from A's origin the numbers reach that both are told by, metres: rounding is a multiple of it.
+    /// Greatest distance from A's origin of the coordinates of both, metres: rounding is a multiple of it.
     pub(super) scale: f64,
     /// Whether both cores are hulls of finitely many points.
     pub(super) polytopes: bool,
@@ -163,25 +163,25 @@ impl<'a> Pair<'a> {
         32.0 * f64::EPSILON * self.scale
     }
 
-    /// What is smaller than this cannot be told from 0.
+    /// Anything smaller than this cannot be distinguished from 0.
     #[inline]
     pub(super) fn tiny(&self) -> f64 {
         4.0 * f64::EPSILON * self.scale
     }
 
-    /// Radii of both cores and the distance of their middles, metres: what methods that end early promise is a share of
-    /// it. Not of the scale: a hull may be told by numbers far from its origin, and is no larger for that.
+    /// Radii of both cores and the distance of their middles, metres: the accuracy of methods that stop early is a
+    /// share of it. Not of the scale: a hull may have coordinates far from its origin without being larger.
     pub(super) fn size(&self) -> f64 {
         let radius = |shape: &Convex| shape.radius() - shape.margin();
         radius(self.a) + radius(self.b) + self.between().norm()
     }
 
-    /// A share of the size, as far as rounding lets it be told, metres.
+    /// A share of the size, but at least the rounding, metres.
     pub(super) fn share(&self, part: f64) -> f64 {
         (part * self.size()).max(self.pad())
     }
 
-    /// How close both ends of a depth should come, metres.
+    /// Required distance of both ends of a depth, metres.
     pub(super) fn tolerance(&self) -> f64 {
         if self.polytopes {
             self.tiny()
@@ -210,7 +210,7 @@ impl<'a> Pair<'a> {
         }
     }
 
-    /// The vertices an earlier answer rested on, where they are now; circles are asked along its `normal`.
+    /// The vertices of an earlier answer, at the present pose; circles are queried along its `normal`.
     pub(super) fn recall(&self, held: &Held, normal: &Vec3) -> impl Iterator<Item = Vertex> {
         let in_b = -self.to_b(normal);
         held.of
@@ -240,11 +240,11 @@ impl<'a> Pair<'a> {
     }
 }
 
-/// Squares of lengths that lost nothing by underflow and are far from overflow.
+/// Range of squared lengths that lost nothing by underflow and are far from overflow.
 const SQUARE_MIN: f64 = 1e-280;
 const SQUARE_MAX: f64 = 1e280;
 
-/// `v` at length 1; `None` for zero and what is not finite.
+/// `v` at length 1; `None` for zero and non-finite vectors.
 #[inline]
 pub(super) fn unit(v: &Vec3) -> Option<Vec3> {
     let square = v.norm_squared();

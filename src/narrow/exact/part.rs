@@ -1,20 +1,20 @@
-//! Polytopes that rounding takes for touching, parted by planes along their edges.
+//! Polytopes that seem to touch because of rounding, separated by planes along their edges.
 //!
-//! In: a pair, and a gap that is wider than rounding. Out: that gap, with what planes and edges prove beside.
+//! In: a pair, and a gap that is wider than rounding. Out: that gap, tightened by what planes and edges prove.
 //!
-//! The face of a sliver has a normal of few digits, and methods that go from normal to normal end where the rounding of
-//! theirs does: far from the truth, which they hold. But every direction proves a gap, and two polytopes that are apart
-//! are parted across a corner, along an edge of each, or along a face. So these directions are tried, of the corners
-//! that the answer rests on and of those that the best direction so far shows.
+//! The face of a sliver has a normal of few digits, and methods that go from normal to normal end at its rounding: with
+//! sound but very wide intervals. But every direction proves a gap, and two polytopes that are apart are separated
+//! across a corner, along an edge of each, or along a face. So these directions are tried, for the corners behind the
+//! answer and for those that the best direction so far shows.
 
 use super::pair::{CoreGap, Pair, Vertex, frame, unit};
 use crate::math::Vec3;
 
 /// Corners of each core whose edges are tried.
 const CORNERS_MAX: usize = 5;
-/// How often the corners that the best direction shows are tried too.
+/// How often the corners shown by the best direction are tried too.
 const ROUNDS_MAX: usize = 4;
-/// Widths that rounding alone leaves, in units of [`Pair::tiny`].
+/// Widths caused by rounding alone, in units of [`Pair::tiny`].
 const ROUNDING: f64 = 64.0;
 
 /// Some corners of a core, A's frame.
@@ -29,7 +29,7 @@ impl Corners {
         &self.points[..self.count]
     }
 
-    /// Whether it is new, and there was room.
+    /// Adds a point. Returns whether it is new, and there was room.
     fn put(&mut self, point: Vec3) -> bool {
         let new = self.count < CORNERS_MAX && !self.all().contains(&point);
         if new {
@@ -39,7 +39,7 @@ impl Corners {
         new
     }
 
-    /// Each two of them; one alone is an edge of no length.
+    /// Every two of them; a single one is an edge of zero length.
     fn edges(&self) -> impl Iterator<Item = (Vec3, Vec3)> + '_ {
         let all = self.all();
         let alone = all.first().filter(|_| all.len() == 1);
@@ -51,7 +51,7 @@ impl Corners {
     }
 }
 
-/// A gap that rounding left open made tighter, as far as planes and edges do; any other as it is.
+/// Tightens a gap that rounding left open, as far as planes and edges can; returns any other as it is.
 pub(super) fn part(pair: &Pair<'_>, gap: CoreGap) -> CoreGap {
     let is_open = gap.upper >= 0.0 && gap.upper - gap.lower > ROUNDING * pair.tiny();
     if !(pair.polytopes && is_open) {
@@ -100,8 +100,8 @@ pub(super) fn part(pair: &Pair<'_>, gap: CoreGap) -> CoreGap {
     best
 }
 
-/// Unit directions across faces and pairs of edges, and from corners to what is nearest of an edge; each both ways, for
-/// which way is out is what slivers do not tell.
+/// Unit directions across faces and pairs of edges, and from corners to the nearest place of an edge; each in both
+/// senses, because slivers do not show which way is out.
 fn normals<'a>(a: &'a Corners, b: &'a Corners) -> impl Iterator<Item = Vec3> + 'a {
     let along = |(from, to): (Vec3, Vec3)| to - from;
     let crossing = a.edges().flat_map(move |one| {
@@ -129,8 +129,8 @@ fn normals<'a>(a: &'a Corners, b: &'a Corners) -> impl Iterator<Item = Vec3> + '
         .flat_map(|normal| [normal, -normal])
 }
 
-/// Across two directions, exactly across the longer one: of two that are nearly parallel the cross product alone has
-/// few digits, and none of it may be along what is long.
+/// Orthogonal to two directions, exactly so to the longer one: for nearly parallel ones the cross product alone has few
+/// digits, and its error must not lie along the long one.
 fn across(one: Vec3, other: Vec3) -> Vec3 {
     let (long, short) = if one.norm_squared() < other.norm_squared() {
         (other, one)
@@ -140,7 +140,7 @@ fn across(one: Vec3, other: Vec3) -> Vec3 {
     long.cross(&beside(&short, &long))
 }
 
-/// What of a direction is across an edge; all of it where the edge has no length.
+/// The part of a direction orthogonal to an edge; all of it if the edge has no length.
 fn beside(dir: &Vec3, edge: &Vec3) -> Vec3 {
     let share = edge.dot(dir) / edge.norm_squared();
     if share.is_finite() {
@@ -150,12 +150,12 @@ fn beside(dir: &Vec3, edge: &Vec3) -> Vec3 {
     }
 }
 
-/// The points of two edges that are nearest to each other, or nearly: any two points of theirs are sound.
+/// The points of two edges that are nearest to each other, or nearly: any two of their points are sound.
 ///
-/// By what is across the first edge alone, for which near-parallel ones lose no digits.
+/// Computed orthogonally to the first edge alone, so near-parallel edges lose no digits.
 fn nearest((p, q): (Vec3, Vec3), (r, s): (Vec3, Vec3)) -> (Vec3, Vec3) {
     let (one, other, from) = (q - p, s - r, p - r);
-    // A quotient by nothing is not a number: then any point of the edge is as near.
+    // A division by zero gives NaN: then any point of the edge is equally near.
     let share = |of: f64, by: f64| {
         let t = (of / by).clamp(0.0, 1.0);
         if t.is_nan() { 0.0 } else { t }

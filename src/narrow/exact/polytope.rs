@@ -1,6 +1,6 @@
-//! A convex polytope that grows: faces with neighbours, and the step that puts a vertex in.
+//! A convex polytope that grows: faces with neighbours, and the step that adds a vertex.
 //!
-//! In: vertices of the Minkowski difference, or three that stand for a cap of it. Out: a closed surface and its face
+//! In: vertices of the Minkowski difference, or three that represent a cap of it. Out: a closed surface and its face
 //! nearest to the origin.
 
 mod first;
@@ -17,8 +17,8 @@ pub use shell::Shell;
 pub(super) struct Face {
     /// Unit, outward; zero when it has no area.
     pub(super) normal: Vec3,
-    /// Least dot product of a corner with `normal`: the triangle is not nearer to the origin. Infinite when it has no
-    /// area.
+    /// Least dot product of a corner with `normal`: a lower bound on the triangle's distance from the origin. Infinite
+    /// if it has no area.
     pub(super) distance: f64,
     pub(super) corners: [Place; 3],
     /// Face across the edge from corner `k` to corner `k + 1`.
@@ -28,19 +28,19 @@ pub(super) struct Face {
 
 const _: () = assert!(size_of::<Face>() == 48, "a query makes some dozens");
 
-/// Place of a vertex or of a face.
+/// Index of a vertex or of a face.
 type Place = u16;
 
-/// The corner behind each one of a triangle.
+/// The next corner of a triangle.
 const NEXT: [usize; 3] = [1, 2, 0];
 
-/// An edge of the hole around a new vertex: from, to, and the face that stays on its far side.
+/// An edge of the hole around a new vertex: from, to, and the face on its far side.
 #[derive(Clone, Copy)]
 struct Edge {
     from: Place,
     to: Place,
     outside: Place,
-    /// Which edge of that face it is.
+    /// Index of the edge in that face.
     slot: u8,
 }
 
@@ -49,19 +49,19 @@ struct Edge {
 pub(super) struct Polytope {
     pub(super) vertices: Vec<Vertex>,
     pub(super) faces: Vec<Face>,
-    /// Distance of each face, infinite for a dead one: what the search for the nearest one reads.
+    /// Distance of each face, infinite for a dead one: the search for the nearest one reads this.
     distances: Vec<f64>,
-    /// By vertex: the one that was last put in with this one on its rim.
+    /// By vertex: the vertex that was last added with this one on its rim.
     met: Vec<Place>,
     hole: Vec<Edge>,
-    /// Edges to go over: a buried face, and which edge of it.
+    /// Edges to visit: a buried face, and the index of its edge.
     stack: Vec<(Place, u8)>,
 }
 
 impl Polytope {
     /// The face nearest to the origin; of equally near ones the first.
     pub(super) fn nearest(&self) -> Option<usize> {
-        // The least of eight lanes, then where it stands: one comparison that decides instead of one for each face.
+        // The least of eight lanes, then its index: a single deciding comparison instead of one per face.
         let mut lanes = [f64::INFINITY; 8];
         let (whole, rest) = self.distances.as_chunks::<8>();
         for chunk in whole {
@@ -88,7 +88,7 @@ impl Polytope {
 
     fn put_face(&mut self, corners: [Place; 3], beside: [Place; 3]) {
         let [a, b, c] = corners.map(|k| self.vertices[usize::from(k)].w);
-        // Of the edges to the last corner the shorter one: a sliver keeps its digits.
+        // The shorter of the edges to the last corner: a sliver keeps its digits.
         let (from_a, from_b) = (c - a, c - b);
         let closer = from_a.norm_squared() <= from_b.norm_squared();
         let edge = if closer { from_a } else { from_b };
@@ -106,7 +106,7 @@ impl Polytope {
         });
     }
 
-    /// Puts `new` in: the faces it sees go, their rim is joined to it. False when that does not give a closed surface.
+    /// Adds `new`: the faces that it sees are removed, their rim is joined to it. False if the surface broke.
     pub(super) fn grow(&mut self, from: usize, new: Vertex, tiny: f64) -> bool {
         let Ok(first) = Place::try_from(from) else {
             return false;
@@ -115,8 +115,8 @@ impl Polytope {
         self.stack.clear();
         self.bury(from);
         self.stack.extend([(first, 2), (first, 1), (first, 0)]);
-        // Flood over the faces that see the new vertex; where the flood ends is the rim, met in its order. What lies in
-        // the new vertex's plane goes too, so that no slivers stay.
+        // Flood over the faces that see the new vertex; the flood ends at the rim and visits it in order. Faces in the
+        // new vertex's plane are removed too, so that no slivers stay.
         while let Some((place, edge)) = self.stack.pop() {
             let face = &self.faces[usize::from(place)];
             let edge = usize::from(edge);
@@ -126,7 +126,7 @@ impl Polytope {
             if !other.alive {
                 continue;
             }
-            // The edge is the other's from `to` to `from`.
+            // In the other face the edge runs from `to` to `from`.
             let slot: u8 = match other.corners {
                 [k, ..] if k == to => 0,
                 [_, k, _] if k == to => 1,
@@ -167,7 +167,7 @@ impl Polytope {
         if count < 3 {
             return false;
         }
-        // Each edge starts where the one before ends, and a corner met twice would pinch the surface.
+        // Each edge starts where the last one ends, and a corner met twice would pinch the surface.
         let mut from = self.hole[count - 1].to;
         for edge in &self.hole {
             let met = std::mem::replace(&mut self.met[usize::from(edge.from)], apex);
@@ -194,15 +194,15 @@ impl Polytope {
         self.distances[place] = f64::INFINITY;
     }
 
-    /// Puts in a vertex that is known to be far out, if any face sees it. False when the surface broke.
+    /// Adds a vertex that is known to be far out, if any face sees it. False if the surface broke.
     pub(super) fn offer(&mut self, new: Vertex, tiny: f64) -> bool {
-        // What is put in side by side is mostly seen by the last faces made.
+        // Vertices added close to each other are usually seen by the last faces made.
         let sees = |face: &Face| face.alive && face.normal.dot(&new.w) - face.distance > tiny;
         let seen = self.faces.iter().rposition(sees);
         seen.is_none_or(|from| self.grow(from, new, tiny))
     }
 
-    /// Witnesses of the point of all faces, dead ones too, that is nearest to `target`, and how far off it is.
+    /// Witnesses of the point of all faces, including dead ones, that is nearest to `target`, and its distance.
     pub(super) fn witnesses_near(&self, target: &Vec3) -> (f64, Vec3, Vec3) {
         let mut best = (f64::INFINITY, Vec3::zeros(), Vec3::zeros());
         for face in &self.faces {
@@ -214,7 +214,7 @@ impl Polytope {
                 w: corner.w - target,
                 ..corner
             });
-            // Tried is what holds the newest corner: each one is the newest once.
+            // Only sub-simplices with the newest corner are tried: so each corner is the newest once.
             for turn in 0..3 {
                 let mut simplex = Simplex::default();
                 for k in 0..3 {
@@ -234,7 +234,7 @@ impl Polytope {
     }
 }
 
-/// The lesser of two numbers, or the second: one instruction, where `f64::min` takes five for what is not a number.
+/// The lesser of two numbers, or the second: one instruction, where `f64::min` takes five to handle NaN.
 #[inline]
 fn lesser(x: f64, y: f64) -> f64 {
     if x < y { x } else { y }

@@ -1,7 +1,7 @@
-//! The unguarded twin, for reports: plain parry at the same poses, as an application calls it. No scale of its own, no
-//! relative pose first, no certificate: what the guarding around it buys is seen beside it.
+//! The unguarded twin, for reports: plain parry at the same poses, as an application calls it. No scaling, no relative
+//! pose first, no certificate: it shows what the guards are worth.
 //!
-//! In: two shapes as they are written, at world poses. Out: one number, which may be wrong.
+//! In: two shapes as specified, at world poses. Out: one number, which may be wrong.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -12,10 +12,10 @@ use parry3d_f64::shape::{SharedShape, TriMeshFlags};
 use crate::math::{Pose, Vec3, to_glam_vec};
 use crate::shape::ShapeSpec;
 
-/// The signed gap, metres, as parry tells it: its distance, or minus the depth of its deepest contact.
+/// The signed gap, metres, as parry reports it: its distance, or minus the depth of its deepest contact.
 ///
-/// * returns - `None`: the pair is not supported, the shape could not be built, or no contact of two that are said to
-///   overlap was found.
+/// * returns - `None`: the pair is not supported, the shape could not be built, or no contact was found for two that
+///   are reported to overlap.
 #[must_use]
 pub fn gap(a: &ShapeSpec, pose_a: &Pose, b: &ShapeSpec, pose_b: &Pose) -> Option<f64> {
     // Its polytopes are known to panic at times; that is an answer, too.
@@ -42,7 +42,7 @@ fn placed(pose: &Pose, local: &ParryPose) -> ParryPose {
     ParryPose::from_parts(at, rotation) * *local
 }
 
-/// A shape, and where its frame is in ours: parry's round shapes stand along y.
+/// A shape, and the pose of its frame in ours: parry's round shapes stand along y.
 fn shape(spec: &ShapeSpec) -> Option<(SharedShape, ParryPose)> {
     let here = ParryPose::IDENTITY;
     let upright = ParryPose::from_parts(

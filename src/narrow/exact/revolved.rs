@@ -2,16 +2,16 @@
 //!
 //! In: a pair. Out: the gap of the cores when both are segments, cylinders or cones and their axes agree, else `None`.
 //!
-//! On one axis the best direction is a whole circle of directions, and beside it nearly one: an expanding polytope
+//! On one axis the best direction is a whole circle of directions, and nearly so close to it: an expanding polytope
 //! would have to resolve all of it, in thousands of faces and milliseconds. But a plane through A's axis shows both
 //! cores as polygons, whose gap has a closed form, and every direction lies in such a plane. So the planes are bisected
-//! by their angle until what they may hide is small:
-//! * A disc of B that leans out of a plane shows an ellipse, of which its long diameter is taken. What is taken lies
-//!   within the difference, so the gap of the polygons is an upper end for every direction of that plane. It is met
-//!   where sides touch; where caps do, a polytope is soon done.
-//! * Between two planes the gap of two given corners along a given side's normal is a smooth function of the angle: not
-//!   above the greater of its ends by more than its second derivative allows. Or else: the gap is convex in the offset
-//!   of the axes, which is monotone between the two, and changes by no more than B's outline moves.
+//! by their angle until what lies between them is small enough:
+//! * A disc of B that leans out of a plane shows an ellipse, which is replaced by its long diameter. That lies within
+//!   the difference, so the gap of the polygons is an upper end for every direction of that plane. It is exact where
+//!   sides touch; where caps do, a polytope finishes quickly.
+//! * Between two planes the gap of two given corners along a given side's normal is a smooth function of the angle: it
+//!   exceeds the greater of its ends by no more than its second derivative allows. Alternatively: the gap is convex in
+//!   the offset of the axes, which is monotone between the two, and changes by no more than B's outline moves.
 //!
 //! Parallel axes need no bisection, whatever their offset: the difference is a solid of revolution itself.
 
@@ -25,20 +25,20 @@ use super::pair::{CoreGap, Held, Pair, unit};
 use crate::math::Vec3;
 use outline::{CORNERS_MAX, Flat, Outline, dot};
 
-/// Sine of the lean up to which planes are tried; the bounds on derivatives below rest on it.
+/// Sine of the lean up to which planes are tried; the bounds on derivatives below depend on it.
 const LEAN_MAX: f64 = 0.3;
-/// Offset and lean of the axes, in parts of the depth, from which the difference is so much flatter than a ball around
-/// the origin that a polytope takes less time.
+/// Offset and lean of the axes, as a share of the depth, from which the difference is so much flatter than a ball
+/// around the origin that a polytope takes less time.
 const ROUND: f64 = 0.15;
-/// How far B's outline swings, in parts of the depth, up to which so few planes do that they are tried all the same.
+/// Swing of B's outline, as a share of the depth, up to which so few planes suffice that they are tried anyway.
 const STIFF: f64 = 1e-3;
-/// Planes looked at, at most; what is known by then is sound, but wider.
+/// Most planes tried; the bound by then is sound, but wider.
 const PLANES_MAX: usize = 512;
-/// Planes that wait, at most: beyond 2^40 parts of the whole they could not be told apart.
+/// Most waiting planes: beyond 2^40 parts of the whole they could not be distinguished.
 const WAITING_MAX: usize = 40;
-/// Corners as far along a normal as the farthest but for this are its edge, in parts of the size.
+/// Corners within this of the farthest along a normal belong to its edge, as a share of the size.
 const SAME: f64 = 5e-7;
-/// How far aside of a normal its features are asked for.
+/// Distance from a normal at which its features are queried.
 const ASIDE: f64 = 1e-2;
 
 /// The best direction known.
@@ -46,16 +46,16 @@ struct Best {
     /// `f(normal)`.
     value: f64,
     normal: Vec3,
-    /// What Newton found, if that is the best one.
+    /// Newton's result, if that is the best one.
     refined: Option<Refined>,
-    /// Greatest `f` of a direction that a plane showed; its angle, and the direction in it.
+    /// Greatest `f` of a direction shown by a plane; the plane's angle, and the direction in it.
     seen: f64,
     plane: (f64, Flat),
-    /// Greatest gap that a plane showed: no upper end is below it.
+    /// Greatest gap shown by a plane: no upper end is below it.
     shown: f64,
 }
 
-/// A direction that may be the best one of a plane: the normal of an edge, and which corners are nearest along it.
+/// A candidate for the best direction of a plane: the normal of an edge, and the nearest corners along it.
 #[derive(Clone, Copy, Default)]
 struct Side {
     n: Flat,
@@ -66,7 +66,7 @@ struct Side {
 /// One plane.
 #[derive(Clone, Copy)]
 struct Slice {
-    /// From the plane that holds the offset of the axes.
+    /// Angle from the plane that holds the offset of the axes.
     angle: f64,
     /// B's origin.
     at: Flat,
@@ -74,19 +74,19 @@ struct Slice {
     sides: [Side; 2 * CORNERS_MAX],
 }
 
-/// Both outlines and how their axes stand to each other.
+/// Both outlines and the relative position of their axes.
 struct Planes<'a> {
     pair: &'a Pair<'a>,
     of_a: Outline,
     of_b: Outline,
-    /// Along the offset of the axes, and across; orthogonal to A's axis.
+    /// Along the offset of the axes, and across it; orthogonal to A's axis.
     one: Vec3,
     other: Vec3,
     /// Offset of B's origin from A's axis, metres.
     off: f64,
     /// B's axis, A's frame.
     axis: Vec3,
-    /// How far B's outline moves, at most, from one plane to another an angle of 1 away, metres.
+    /// Most that B's outline moves between planes, per radian, metres.
     swing: f64,
     /// Bound on the second derivative of a side's gap by the angle, metres.
     bend: f64,
@@ -94,14 +94,14 @@ struct Planes<'a> {
 
 /// The gap of two overlapping cores of revolution whose axes nearly agree; its ends may stay apart.
 ///
-/// * `warm` - what Newton made of the features of an earlier answer, if anything.
+/// * `warm` - Newton's result from the features of an earlier answer, if any.
 ///
 /// Cost: 1 us for parallel axes, 10 to 40 us where they lean.
 pub(super) fn gap(pair: &Pair<'_>, warm: Option<&Refined>) -> Option<CoreGap> {
     let planes = Planes::of(pair)?;
     let tolerance = pair.tolerance();
     let mut best = Best::from(warm);
-    // Else one plane shows what all the others do.
+    // Otherwise one plane shows what all the others do.
     if planes.swing * PI > tolerance {
         planes.look_ahead(&mut best);
         if planes.off + planes.swing > ROUND * -best.value && planes.swing > STIFF * -best.value {
@@ -144,12 +144,12 @@ impl<'a> Planes<'a> {
         }
         let aside = Vec3::new(pair.at.x, pair.at.y, 0.0);
         let (off, one) = (aside.norm(), unit(&aside).unwrap_or_else(Vec3::x));
-        // Per angle of 1 the axis goes `lean` along the plane and turns by at most so much more as it is not upright.
+        // Per radian the axis moves by `lean` along the plane and turns by at most a bit more, as it is not upright.
         let upright = (1.0 - LEAN_MAX * LEAN_MAX).sqrt();
         let reaches = (of_b.corners().iter()).map(|[r, z]| r.abs() / upright + z.abs());
         let swing = lean * reaches.fold(0.0, f64::max);
-        // A side's gap is n . w: n turns by less than 1.3 of the lean, its rate changes by less than 2, and w is within
-        // the scale; w itself bends by `off` and by less than twice the swing.
+        // A side's gap is n . w: n turns by less than 1.3 of the lean, its rate changes by less than 2, and |w| is
+        // within the scale; the second derivative of w is at most `off` plus less than twice the swing.
         let bend = off + 2.6 * lean * (pair.scale + off) + 2.8 * swing;
         Some(Self {
             pair,
@@ -169,7 +169,7 @@ impl<'a> Planes<'a> {
         self.one * cos + self.other * sin
     }
 
-    /// Looks for a good direction first: in the planes where B's axis leans least and most.
+    /// First looks for a good direction: in the planes where B's axis leans least and most.
     fn look_ahead(&self, best: &mut Best) {
         let upright = (self.axis.dot(&self.one)).atan2(-self.axis.dot(&self.other));
         for quarter in [0.0, 0.5, 1.0, 1.5] {
@@ -178,7 +178,7 @@ impl<'a> Planes<'a> {
         self.refine(best);
     }
 
-    /// One plane; the best of its directions is asked of the pair itself.
+    /// One plane; its best direction is evaluated on the pair itself.
     fn slice(&self, angle: f64, best: &mut Best) -> Slice {
         let along = self.along(angle);
         let of_b = self.of_b.along([along.dot(&self.axis), self.axis.z]);
@@ -224,7 +224,7 @@ impl<'a> Planes<'a> {
         &slice.sides[..self.of_a.corners().len() + self.of_b.corners().len()]
     }
 
-    /// The gap along `n` of a side's two corners: the gap of the outlines along it is not above that.
+    /// The gap along `n` of a side's two corners: an upper bound on the gap of the outlines along it.
     fn value(&self, slice: &Slice, n: Flat, side: &Side) -> f64 {
         let (a, b) = (
             self.of_a.corners()[side.of_a],
@@ -233,7 +233,7 @@ impl<'a> Planes<'a> {
         dot(n, [slice.at[0] + b[0] - a[0], slice.at[1] + b[1] - a[1]])
     }
 
-    /// Upper end of the gap along every direction in the planes between two.
+    /// Upper end of the gap along every direction between two planes.
     fn bound(&self, from: &Slice, to: &Slice) -> f64 {
         let width = to.angle - from.angle;
         let (bent, moved) = (self.bend * width * width / 8.0, self.swing * width);
@@ -259,7 +259,7 @@ impl<'a> Planes<'a> {
         most
     }
 
-    /// Newton on the features to either side of the best direction, if a plane showed it.
+    /// Runs Newton on the features to either side of the best direction, if a plane showed it.
     fn refine(&self, best: &mut Best) {
         if best.refined.is_some() {
             return;
@@ -284,14 +284,14 @@ impl<'a> Planes<'a> {
         if let Some(found) = &best.refined {
             (gap.point_a, gap.point_b, gap.held) = (found.point_a, found.point_b, found.held);
         }
-        // Newton may know the direction, and not where on a cap the two would touch.
+        // Newton may know the direction, but not where on a cap the two would touch.
         if best.refined.is_none() || !gap.is_straight(self.pair) {
             (gap.point_a, gap.point_b) = self.witnesses(best, &gap);
         }
         gap
     }
 
-    /// Points straight across from each other: where edges would touch, or a corner, if that lies better on both cores.
+    /// Opposite points: where edges would touch, or a corner, if that lies better on both cores.
     fn witnesses(&self, best: &Best, gap: &CoreGap) -> (Vec3, Vec3) {
         let across = gap.normal * gap.lower;
         let corner = self.pair.support(&gap.normal);
@@ -307,7 +307,7 @@ impl<'a> Planes<'a> {
         least.1
     }
 
-    /// How far two points are from the surface of A and that of B, metres.
+    /// Distance of two points from the surfaces of A and of B, metres.
     fn off_cores(&self, a: &Vec3, b: &Vec3) -> f64 {
         let pair = self.pair;
         let of_a = nearest(pair.a.core(), a);
@@ -316,7 +316,7 @@ impl<'a> Planes<'a> {
         off(of_a).max(off(of_b))
     }
 
-    /// The middle of what the features that would touch share in their plane, on the shorter one of the two.
+    /// The middle of the overlap, in their plane, of the features that would touch; on the shorter one.
     fn shared(&self, (angle, flat): (f64, Flat), across: &Vec3) -> (Vec3, Vec3) {
         let along = self.along(angle);
         let of_b = self.of_b.along([along.dot(&self.axis), self.axis.z]);
@@ -328,14 +328,14 @@ impl<'a> Planes<'a> {
         let spread = |shown: [(f64, usize); 2]| shown[1].0 - shown[0].0;
         let low = shown_a[0].0.max(shown_b[0].0 + lift);
         let high = shown_a[1].0.min(shown_b[1].0 + lift);
-        // A corner of B as it is, with what leans out of the plane.
+        // A corner of B itself, with the part that leans out of the plane.
         let side = self.axis.cross(&along.cross(&self.axis)).normalize();
         let side = side * self.axis.z.signum();
         let on_b = |corner: usize| {
             let [r, z] = self.of_b.corners()[corner];
             self.pair.at + side * r + self.axis * z
         };
-        // Where an edge of B goes through the plane.
+        // Where an edge of B crosses the plane.
         let beyond = along.cross(&Vec3::z());
         let [start, end] = shown_b.map(|(_, corner)| on_b(corner).dot(&beyond));
         let part = start / (start - end);
@@ -360,7 +360,7 @@ impl<'a> Planes<'a> {
     }
 }
 
-/// The point at `t` of the edge between two corners, each with its `t`.
+/// The point at parameter `t` of the edge between two corners, each given with its own `t`.
 fn between(ends: [(f64, usize); 2], t: f64, place: impl Fn(usize) -> Vec3) -> Vec3 {
     let [(from, first), (to, last)] = ends;
     let part = ((t - from) / (to - from)).clamp(0.0, 1.0);

@@ -1,7 +1,7 @@
 //! Separating axes of two boxes: their exact depth, or a direction that separates them.
 //!
-//! In: a pair. Out: the gap when they overlap, else a first direction for GJK; nothing for other cores. The depth of
-//! two polytopes is least along a face normal or along the cross product of two edges: 15 axes for boxes.
+//! In: a pair. Out: the gap if they overlap, else a first direction for GJK; nothing for other cores. The depth of two
+//! polytopes is least along a face normal or along the cross product of two edges: 15 axes for boxes.
 //!
 //! Source: Gottschalk, Lin, Manocha 1996, OBBTree.
 
@@ -10,15 +10,15 @@ use super::pair::{CoreGap, Held, Pair};
 use crate::math::Vec3;
 use crate::shape::Core;
 
-/// Edges closer to parallel than this (sine) have no cross axis of their own: leaving it out costs at most the sine
-/// times the size, keeping it costs roundoff divided by the sine times the size. Here both meet.
+/// Edges closer to parallel than this (sine) get no cross axis: leaving it out costs at most the sine times the size,
+/// keeping it costs roundoff divided by the sine times the size. Both are equal here.
 const PARALLEL: f64 = 1e-8;
-/// A box shows a corner, not an edge, where no part of the normal in its frame is below this.
+/// A box shows a corner, not an edge, if every component of the normal in its frame exceeds this.
 const CORNER: f64 = 1e-6;
-/// How far beyond its end an edge may be met, in parts of the size: roundoff of the crossing of two lines.
+/// How far beyond its end an edge may be met, as a share of the size: roundoff of the intersection of two lines.
 const SAME: f64 = 1e-9;
 
-/// What the axes say of two boxes.
+/// Result of the axis tests of two boxes.
 pub(super) enum Axes {
     /// They overlap or touch.
     Overlap(CoreGap),
@@ -100,7 +100,7 @@ fn least_overlap(pair: &Pair<'_>, ha: &Vec3, hb: &Vec3) -> (Least, f64) {
         let (i1, i2) = ((i + 1) % 3, (i + 2) % 3);
         for j in 0..3 {
             let (j1, j2) = ((j + 1) % 3, (j + 2) % 3);
-            // e_i x column j, its length, and the extents along it, all from entries of the rotation.
+            // e_i x column j, its length, and the extents along it, all from entries of the rotation matrix.
             let (p, q) = (rotation[(i2, j)], rotation[(i1, j)]);
             let sine = (p * p + q * q).sqrt();
             if sine < PARALLEL {

@@ -1,23 +1,23 @@
 //! Cores that overlap deep within a cylinder or cone, near its axis: a chip in a drum, a pin in a wide hole.
 //!
-//! In: a pair of which one core is a cylinder or a cone. Out: the gap of the cores, or `None` where no core is round or
+//! In: a pair of which one core is a cylinder or a cone. Out: the gap of the cores, or `None` if no core is round or
 //! nothing is proved.
 //!
 //! Seen from the axis nearly all directions around it are alike, and an expanding polytope would have to resolve the
-//! rim: its error falls with the square of its faces, and ends at a thousandth. But in a plane through the axis the
-//! round core shows its outline, whatever the plane, so that only what the other core shows changes with the angle. A
-//! sector of planes is proved by a chain of points of the difference, each a point of the other core and a corner of
-//! the outline, from the top down:
-//! * A point's place along the plane is a constant and a sine of the angle, so within the sector not below the straight
-//!   line between its ends by more than its bend allows: by nothing where it lies on the plane's own side of the axis.
-//! * Places along the plane are linear then, and heights constant. A direction along which two points that follow each
-//!   other reach `d` at both ends of the sector does for them in between. So does the normal of the line through them
-//!   where it is `d` away at both ends: `p x q - d |q - p|` is linear less convex.
+//! rim: its error falls with the square of its faces, and ends at a thousandth. But in any plane through the axis the
+//! round core shows the same outline, so that only the other core's outline changes with the angle. A sector of planes
+//! is proved by a chain of points of the difference, each the sum of a point of the other core and a corner of the
+//! outline, from the top down:
+//! * A point's place along the plane is a constant plus a sine of the angle, so within the sector it is below the
+//!   straight line between its ends by at most what its bend allows: by nothing on the plane's side of the axis.
+//! * With places along the plane linear and heights constant, a direction along which two successive points reach `d`
+//!   at both ends of the sector does so in between. So does the normal of the line through them if it is `d` away at
+//!   both ends: `p x q - d |q - p|` is linear less convex.
 //! * Then each point of the chain reaches `d` along the directions shared with either neighbour, so along all between
 //!   them; with the first one `d` high and the last one `d` low, these are all directions of the sector's half planes.
 //!
-//! Sectors are parted, where the other core's farthest corner changes if it does, until all of them are as deep as the
-//! best direction met.
+//! Sectors are split, at the angle where the other core's farthest corner changes if it does, until all are as deep as
+//! the best direction found.
 
 mod answer;
 mod chain;
@@ -30,24 +30,24 @@ use crate::math::Vec3;
 use crate::shape::{Convex, Core};
 use chain::{Chain, Flat, Least, Link, along, dot, out};
 
-/// Sectors looked at, at most; what is proved by then is sound, but wider.
+/// Most sectors visited; what is proved by then is sound, but wider.
 const SECTORS_MAX: usize = 512;
-/// Points of a hull looked at, at most, which takes some half a millisecond; who has more is not asked to its end.
+/// Most points of a hull visited, some half a millisecond; larger hulls are not processed to the end.
 const POINTS_MAX: usize = 500_000;
-/// How often a sector asks for the farthest point, about.
+/// How often a sector queries the farthest point, roughly.
 const ASKED: usize = 10;
-/// With fewer sectors nothing is proved that a polytope would not tell.
+/// With fewer sectors nothing is proved that a polytope would not prove.
 const SECTORS_LEAST: usize = 64;
-/// Sectors that wait, at most.
+/// Most sectors that wait.
 const WAITING_MAX: usize = 40;
-/// How far aside of the axis, and of square to it, a chain's first points are asked for: it takes those farther out of
-/// equal ones.
+/// Displacement from the axis, and from its orthogonal plane, at which a chain's first points are queried: of equal
+/// ones it selects those farther out.
 const ASIDE: f64 = 1e-12;
-/// What is rounded on the way from supports to a chain's bound, in parts of what cannot be told from 0.
+/// Rounding between supports and a chain's bound, in multiples of [`Pair::tiny`].
 const ROUNDED: f64 = 4.0;
-/// A sector is not parted nearer to its ends, in parts of it.
+/// A sector is not split nearer to its ends, as a share of it.
 const EDGE: f64 = 1e-3;
-/// How far the other core reaches from the axis, in parts of the radius, up to which a polytope takes more time.
+/// How far the other core reaches from the axis, as a share of the radius, up to which a polytope takes more time.
 const NARROW: f64 = 0.02;
 
 /// The best direction known.
@@ -55,25 +55,25 @@ struct Best {
     /// `f(normal)`.
     value: f64,
     normal: Vec3,
-    /// What Newton found, if that is the best one.
+    /// Newton's result, if that is the best one.
     refined: Option<Refined>,
-    /// The plane that showed it, and where in it.
+    /// The plane that showed it, and the direction in it.
     along: Vec3,
     n: Flat,
 }
 
-/// The pair as it is seen from the round core.
+/// The pair as seen from the round core.
 struct Around<'a> {
     pair: &'a Pair<'a>,
     a_is_round: bool,
-    /// Of its outline, turned half around its origin; the upper one is not nearer to the axis.
+    /// Corners of its outline, rotated by half a turn about its origin; the upper one is not nearer to the axis.
     corners: [Flat; 2],
 }
 
-/// The gap of two overlapping cores of which one is round, where the other reaches so little far from its axis that a
-/// polytope takes more time; its ends may stay apart.
+/// The gap of two overlapping cores of which one is round, if the other stays so close to its axis that a polytope
+/// takes more time; its ends may stay apart.
 ///
-/// * `warm` - what Newton made of the features of an earlier answer, if anything.
+/// * `warm` - Newton's result from the features of an earlier answer, if any.
 ///
 /// Cost: mostly 5 to 50 us; with hulls of hundreds of points up to half a millisecond.
 pub(super) fn narrow_gap(pair: &Pair<'_>, warm: Option<&Refined>) -> Option<CoreGap> {
@@ -81,7 +81,7 @@ pub(super) fn narrow_gap(pair: &Pair<'_>, warm: Option<&Refined>) -> Option<Core
     around.is_narrow().then(|| around.gap(warm)).flatten()
 }
 
-/// The same of the others.
+/// The same for all other such pairs.
 pub(super) fn wide_gap(pair: &Pair<'_>, warm: Option<&Refined>) -> Option<CoreGap> {
     let around = Around::of(pair)?;
     (!around.is_narrow()).then(|| around.gap(warm)).flatten()
@@ -125,7 +125,7 @@ impl<'a> Around<'a> {
         self.breadth() <= NARROW * self.corners[0][0]
     }
 
-    /// Sectors that may be looked at.
+    /// Most sectors to visit.
     fn sectors_max(&self) -> usize {
         match self.other().core() {
             Core::Hull(hull) => {
@@ -144,7 +144,7 @@ impl<'a> Around<'a> {
         }
     }
 
-    /// How far the other core reaches from the axis, at most, metres.
+    /// Upper bound on how far the other core reaches from the axis, metres.
     fn breadth(&self) -> f64 {
         let pair = self.pair;
         let (middle, other) = if self.a_is_round {
@@ -155,7 +155,7 @@ impl<'a> Around<'a> {
         middle.x.hypot(middle.y) + other.radius() - other.margin()
     }
 
-    /// From A to B, where this is the way out of the round core, its frame.
+    /// From A to B, where `out` leads out of the round core, its frame.
     fn normal(&self, out: &Vec3) -> Vec3 {
         if self.a_is_round {
             -out
@@ -176,7 +176,7 @@ impl<'a> Around<'a> {
         }
     }
 
-    /// The farthest along a direction of a plane.
+    /// The farthest point along a direction of a plane.
     fn link(&self, along: &Vec3, n: Flat) -> Link {
         let of_other = self.farthest(&out(along, n));
         let [upper, lower] = self.corners;
@@ -197,7 +197,7 @@ impl<'a> Around<'a> {
         }
     }
 
-    /// A chain of what is farthest in a plane, as fine as the best direction known asks for.
+    /// A chain of the farthest points in a plane, as fine as the best known direction requires.
     fn chain(&self, along: &Vec3, best: &mut Best) -> Chain {
         let mut chain = Chain::default();
         for n in [[ASIDE, 1.0], [1.0, ASIDE], [1.0, -ASIDE], [ASIDE, -1.0]] {
@@ -244,7 +244,7 @@ impl<'a> Around<'a> {
         (depth > 0.0).then(|| self.answer(&best, -depth))
     }
 
-    /// What is proved of the depth, all around.
+    /// The proved depth, all around.
     fn prove(&self, best: &mut Best) -> f64 {
         let close_m = self.pair.tolerance();
         let most = self.sectors_max();
@@ -269,7 +269,7 @@ impl<'a> Around<'a> {
             }
             let close = least.depth >= -best.value - close_m;
             match parting {
-                // Of a hull of many points nothing is known that a polytope would not tell sooner.
+                // For a hull of many points, a polytope would find all this sooner.
                 Some(_) if !close && looked_at == most && most < SECTORS_MAX => return 0.0,
                 Some(at) if !close && looked_at < most && count < WAITING_MAX => {
                     waiting[count] = self.change(&chain, &least, at, (from, to));
@@ -286,7 +286,7 @@ impl<'a> Around<'a> {
         depth
     }
 
-    /// The angle to part a sector at: where the corner that is farthest at its end becomes so, or the middle.
+    /// The angle at which to split a sector: where the farthest corner at its end becomes the farthest, or the middle.
     fn change(&self, chain: &Chain, least: &Least, end: &Vec3, (from, to): (f64, f64)) -> f64 {
         let middle = from + (to - from) / 2.0;
         if !self.other().core().is_polytope() {
@@ -316,7 +316,7 @@ impl<'a> Around<'a> {
 
 impl Best {
     fn take(&mut self, found: &Refined, tiny: f64) {
-        // Of what is as good, too, the closest points are known.
+        // Also if equally good: its closest points are known.
         if found.value >= self.value - tiny {
             (self.value, self.normal) = (found.value, found.normal);
             self.refined = Some(*found);

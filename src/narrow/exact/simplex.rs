@@ -1,10 +1,10 @@
 //! The point of a simplex that is closest to the origin.
 //!
-//! In: up to four vertices, the newest last. Out: the sub-simplex the closest point lies in, its weights, and the
-//! direction from the origin, from whichever formula is the most accurate for it.
+//! In: up to four vertices, the newest last. Out: the sub-simplex that holds the closest point, its weights, and the
+//! direction from the origin by the most accurate formula for it.
 //!
 //! All sub-simplices with the newest vertex are tried and the least distance of an admissible one wins (Johnson's
-//! back-up procedure): no decision hangs on the sign of a rounded number alone.
+//! back-up procedure): no decision depends on the sign of a rounded number alone.
 
 use super::pair::{Vertex, unit};
 use crate::math::Vec3;
@@ -20,7 +20,7 @@ pub(super) struct Simplex {
 /// A sub-simplex, and its point that is closest to the origin.
 #[derive(Clone, Copy)]
 pub(super) struct Nearest {
-    /// The newest vertex first, the others as they stand.
+    /// The newest vertex first, the others in their order.
     places: [usize; 3],
     weights: [f64; 3],
     count: usize,
@@ -53,7 +53,7 @@ impl Simplex {
 
     /// The point closest to the origin; `None`: the origin is inside, or there is no vertex.
     ///
-    /// Sub-simplices with the newest vertex are tried, and no others.
+    /// Only sub-simplices with the newest vertex are tried.
     pub(super) fn nearest(&self) -> Option<Nearest> {
         let new = self.count.checked_sub(1)?;
         if self.weights_inside().is_some() {
@@ -92,14 +92,14 @@ impl Simplex {
         Some(best)
     }
 
-    /// Keeps all four vertices, around the origin as they are.
+    /// Keeps all four vertices, which enclose the origin.
     pub(super) fn keep_all(&mut self) {
         if let Some(weights) = self.weights_inside() {
             self.weights = weights;
         }
     }
 
-    /// Cuts the simplex down to what [`Simplex::nearest`] found. The rest moves up: who stands in its place stays.
+    /// Reduces the simplex to what [`Simplex::nearest`] found. Vertices that stay keep their order.
     pub(super) fn keep(&mut self, nearest: &Nearest) {
         let (mut places, mut weights) = (nearest.places, nearest.weights);
         let count = nearest.count;
@@ -114,13 +114,13 @@ impl Simplex {
         self.count = count;
     }
 
-    /// Takes the newest vertex out again.
+    /// Removes the newest vertex.
     pub(super) fn pop(&mut self) {
         self.count = self.count.saturating_sub(1);
     }
 
-    /// Unit direction from the origin to the affine hull: for near touching pairs the closest point itself is mostly
-    /// rounding, and what is orthogonal to the features is not.
+    /// Unit direction from the origin to the affine hull: for nearly touching pairs the closest point itself is mostly
+    /// rounding, but a direction orthogonal to the features is not.
     pub(super) fn direction(&self, nearest: &Nearest) -> Option<Vec3> {
         let w = |k: usize| self.vertices[nearest.places[k]].w;
         let point = &nearest.point;
@@ -143,7 +143,7 @@ impl Simplex {
         }
     }
 
-    /// Weights of the origin, where it lies in a tetrahedron; none of them is below 0.
+    /// Weights of the origin, if it lies in the tetrahedron; none of them is below 0.
     fn weights_inside(&self) -> Option<[f64; 4]> {
         if self.count < 4 {
             return None;
@@ -151,7 +151,7 @@ impl Simplex {
         let [a, b, c, d] = self.vertices.map(|v| v.w);
         let det = |p: &Vec3, q: &Vec3, r: &Vec3| p.dot(&q.cross(r));
         let volume = det(&(b - a), &(c - a), &(d - a));
-        // Weights of the four corners, times the volume, from differences with d where the sizes are least.
+        // Weights of the four corners, times the volume, from differences with d, where magnitudes are least.
         let from = -d;
         let (ad, bd, cd) = (a - d, b - d, c - d);
         let va = det(&from, &bd, &cd);
@@ -182,7 +182,7 @@ fn consider(best: &mut Nearest, places: [usize; 3], weights: [f64; 3], count: us
 pub(super) fn normal_of(a: &Vec3, b: &Vec3, c: &Vec3) -> Vec3 {
     let (ab, bc, ca) = (b - a, c - b, a - c);
     let (x, y, z) = (ab.norm_squared(), bc.norm_squared(), ca.norm_squared());
-    // Chosen first and multiplied once: which side is longest no processor guesses.
+    // Selected first and multiplied once: no processor can predict which side is longest.
     let (one, other) = if x >= y && x >= z {
         (bc, ca)
     } else if y >= z {

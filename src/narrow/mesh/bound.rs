@@ -1,13 +1,13 @@
 //! Lower bounds on the gap of everything in one box and everything in another, at a fixed relative pose.
 //!
-//! In: nodes of two trees. Out: the greatest signed separation along 15 axes. For any unit axis the separation of
-//! two boxes is a lower bound on the gap of what they hold: a distance when positive, and when negative minus a
-//! translation that separates the boxes, so also whatever convex piece lies in the one from any in the other. The
-//! depth of a point of A under the surface of B is at most the overlap of their extents along any axis too: going
-//! that far along it leaves B's box, so the bound of two root boxes is sound for solids as well.
+//! In: nodes of two trees. Out: the greatest signed separation along 15 axes. For any unit axis the separation of two
+//! boxes is a lower bound on the gap of their contents: if positive, a distance; if negative, minus a translation that
+//! separates the boxes, and so any convex piece in one from any in the other. The depth of a point of A under the
+//! surface of B is also at most the overlap of their extents along any axis: moving that far along it leaves B's box.
+//! So the bound of two root boxes is sound for solids as well.
 //!
-//! Source: Gottschalk, Lin, Manocha 1996, OBBTree: a hierarchical structure for rapid interference detection; the
-//! relative rotation is the same for all node pairs here, so its edge axes are made once.
+//! Source: Gottschalk, Lin, Manocha 1996, OBBTree: a hierarchical structure for rapid interference detection; here the
+//! relative rotation is the same for all node pairs, so the edge axes are computed once.
 
 use nalgebra::Matrix3;
 
@@ -15,7 +15,7 @@ use super::placed::Placed;
 use crate::math::{Point, Pose, Vec3};
 use crate::shape::Node;
 
-/// One edge axis: unit direction in A's frame, and what a box of A and one of B extend along it.
+/// One edge axis: unit direction in A's frame, and the extents of a box of A and of one of B along it.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     direction: Vec3,
@@ -23,7 +23,7 @@ struct Axis {
     of_b: Vec3,
 }
 
-/// What is the same for all boxes of a pair: the relative pose, and how much rounding stands behind each number.
+/// What is the same for all boxes of a pair: the relative pose, and rounding bounds.
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
     pub(super) placed: Placed,
@@ -71,7 +71,7 @@ impl Frame {
             for j in 0..3 {
                 let cross = Vec3::ith(i, 1.0).cross(&rotation.column(j).into_owned());
                 let length = cross.norm();
-                // Nearly parallel edges: the face axes see what this one would, and its direction would be noise.
+                // Nearly parallel edges: the face axes cover this one, and its direction would be noise.
                 if length < 1e-3 {
                     continue;
                 }
@@ -87,7 +87,7 @@ impl Frame {
         frame
     }
 
-    /// Unit axes worth a look for the two as wholes, A's frame: those of A, those of B, and the line between them.
+    /// Unit axes worth testing for the two whole shapes, A's frame: those of A, those of B, and the line between them.
     pub(super) fn axes(&self) -> impl Iterator<Item = Vec3> {
         let rotation = self.placed.rotation;
         let of_a = (0..3).map(|k| Vec3::ith(k, 1.0));
@@ -101,8 +101,8 @@ impl Frame {
         self.between
     }
 
-    /// A lower bound on the gap of all in box `a` and all in box `b`, metres, rounded down; negative where they
-    /// overlap: minus the least overlap along the axes tried.
+    /// A lower bound on the gap of the contents of box `a` and box `b`, metres, rounded down; negative if they overlap:
+    /// minus the least overlap along the axes tried.
     pub(super) fn low(&self, a: &Node, b: &Node) -> f64 {
         let (half_a, half_b) = (a.half(), b.half());
         let rotation = &self.placed.rotation;

@@ -1,26 +1,26 @@
-//! The certificate front of a mesh pair: what was proved of it stays proved while the two have moved less than it
-//! takes.
+//! The certificate front of a mesh pair: a proof stays valid until the two have moved by more than it allows.
 //!
-//! In: two shapes of which at least one is a mesh and none is a half-space, and one pose after the other of B seen from
-//! A. Out: a sound interval of their gap at the pose it works at, a witness, contacts. Stops after any unit, and goes
-//! on at the same pose or at another.
+//! In: two shapes of which at least one is a mesh and none is a half-space, and successive poses of B seen from A. Out:
+//! a sound interval of their gap at the current pose, a witness, contacts. Stops after any unit, and continues at the
+//! same pose or at another.
 //!
 //! Every pair of leaves is covered by exactly one entry at any time (see `cover`; [`CarriedFront::covered`] counts
 //! them).
 //!
-//! The path `S` runs over anchors (poses), and `d` is the displacement from the newest: what is apart by `g` now holds
-//! while `S + d < g + S - d` (here of the relative pose, so two that move together do not move). An anchor
-//! is taken where the pair goes on away from the last two, and where the bounds are to be exact; so a drift adds up its
-//! length, and a pair that trembles about its place adds nothing.
+//! The path `S` runs over anchors (poses), and `d` is the displacement from the newest: boxes apart by `g` now stay
+//! apart while `S + d < g + S - d` (with `S` and `d` of now on the right; both of the relative pose, so two that move
+//! together do not move). An anchor is set when the pair moves on away from the last two, and when bounds must be
+//! exact; so a drift adds up its length, and trembling in place adds nothing.
 //!
-//! Three orders for the three jobs: depth first, deepest overlap first, for a verdict; the heap, best first, for the
-//! bounds; depth first to the end for the contact set. [`Search`] names the others: they are the baselines they are.
+//! Three orders for three goals: depth first, deepest overlap first, for a verdict; the heap, best first, for the
+//! bounds; depth first to the end for the contact set. The others in [`Search`] are baselines.
 //!
-//! A mesh that deforms moves too: the sum of its updates' largest displacements is added to the path. Its boxes may be
-//! of older vertices; then as much is taken off the gap of boxes (`placed`). Leaves are always those of now.
+//! A mesh that deforms moves too: the sum of its updates' largest displacements is added to the path. Its boxes may
+//! belong to older vertices; then as much is subtracted from the gap of boxes (`placed`). Leaves always have the
+//! present vertices.
 //!
-//! Refused: radii of nodes in place of the body's (the order of a heap would change with the motion); one entry for
-//! each pair of boxes (eight times the memory, and eight boxes are tested at the cost of one and a half).
+//! Refused: radii of nodes instead of the body's (the order of a heap would change with the motion); one entry for each
+//! pair of boxes (eight times the memory, and eight boxes are tested at the cost of one and a half).
 
 use super::bound::Frame;
 use super::contacts::LeafContact;
@@ -56,8 +56,8 @@ use known::Known;
 pub use store::FrontStore;
 use touch::Crossing;
 
-/// Steps beyond this share of the smaller body's radius start anew where the touch is lost: 5,300 units in place of
-/// 7,300 at 2 % of the diameter a tick, 3,400 in place of 3,700 at 0.5 %; at 0.02 more pairs stay open within a limit.
+/// A front that touched starts over after a step beyond this share of the smaller radius: at 2 % of the diameter a tick
+/// 5,300 units instead of 7,300, at 0.5 % 3,400 instead of 3,700; at 0.02 more pairs stay open within a limit.
 const ADRIFT: f64 = 0.04;
 
 /// The front of one pair; its entries are in a [`FrontStore`], the same one from [`CarriedFront::start`] to
@@ -69,13 +69,13 @@ pub struct CarriedFront {
     started: bool,
     at: Placed,
     cover: Cover,
-    /// Boxes of a side that is convex.
+    /// The box of each convex side.
     whole: [Option<Obb>; 2],
     solids: bool,
-    /// Least depth that a solid pair can have, or an open pair of pieces, metres; sound whatever else is known.
+    /// Least depth that a solid pair, or an open pair of pieces, can have, metres; always sound.
     floor_m: f64,
     shells: ShellTests,
-    /// Until when the answer of the inside tests holds, as a path, metres.
+    /// Until when the result of the inside tests holds, as a path, metres.
     shells_expiry_m: f64,
     /// Settled: the surfaces were found apart.
     wear: Wear,
@@ -87,12 +87,12 @@ pub struct CarriedFront {
     crossing: Option<Crossing>,
     parting: Parting,
     deep: Deep,
-    /// Where a search for an overlap of leaves that only just touch was in vain.
+    /// Where the last search for an overlap of leaves that barely touch failed.
     vain: Lack,
     contacts: Patches,
-    /// What the two had deformed when they were last looked at.
+    /// The deformation of the two at the last move.
     bent: Bent,
-    /// Which trees the boxes are of.
+    /// The trees that the boxes belong to.
     trees: [u32; 2],
 }
 
@@ -125,28 +125,28 @@ impl CarriedFront {
         self.start_over(store, a, b);
     }
 
-    /// Forgets everything and gives its memory back.
+    /// Forgets everything and releases its memory.
     pub fn release(&mut self, store: &mut FrontStore) {
         self.cover.release(&mut store.entries);
         self.contacts.release(&mut store.contacts);
-        // Another pair may have it next.
+        // Another pair may get it next.
         self.started = false;
         (self.last, self.crossing) = (None, None);
         (self.parting, self.deep) = (Parting::default(), Deep::default());
     }
 
-    /// Tells what it holds.
+    /// Lists what it holds.
     pub(in crate::narrow) fn tell<'a>(&'a self, held: &mut Holdings<'a>) {
         held.covers.push(&self.cover);
         held.leaves.push(self.contacts.run());
     }
 
-    /// Takes the pair to another pose, and to the vertices of now; what was proved is carried over as far as it holds.
+    /// Moves the pair to another pose, and to the present vertices; proofs are carried over as far as they hold.
     pub fn move_to(&mut self, store: &mut FrontStore, a: &Shape, b: &Shape, pos12: &Pose) {
         let bent = Bent::of_shapes(a, b);
         let other_trees = self.trees != trees_of(a, b);
         if self.at.pos12 == *pos12 && bent == self.bent && !other_trees {
-            // A refit since can only have brought boxes nearer to what they hold.
+            // A refit since then can only have tightened boxes.
             self.at.lag_m = lag_of(a, b);
             return;
         }
@@ -165,7 +165,7 @@ impl CarriedFront {
             self.measure_depth(a, b);
         }
         let worn = (self.wear).is_worn_out(&self.cover, &store.entries, [a.radius, b.radius]);
-        // Where a long step has lost the touch, what is left open is far from the next one.
+        // If a long step has lost the touch, the open entries are far from the next one.
         let adrift = !self.cover.touching.is_empty()
             && self.cover.drift.last_m > ADRIFT * a.radius.min(b.radius);
         if worn || adrift || self.search != Search::Carried {
@@ -178,13 +178,13 @@ impl CarriedFront {
         self.cover.arrive(&mut store.entries);
         if self.cover.drift.left_m(self.shells_expiry_m) <= 0.0 {
             self.shells.start(self.solids);
-            // It spoke of the answer that is gone: where the pair comes back another may stand, of the other side.
+            // This expiry belongs to the discarded result: when the pair comes back, the other side's may hold.
             self.shells_expiry_m = f64::NEG_INFINITY;
         }
     }
 
-    /// A mesh has other vertices than when this was last asked, and the front is to stay at its pose: what is found
-    /// from now on is of the new ones, and its user allows for what moved meanwhile.
+    /// A mesh has new vertices, and the front is to stay at its pose: later results refer to the new ones, and the
+    /// caller allows for the deformation in between.
     pub(super) fn note_bend(&mut self, a: &Shape, b: &Shape) {
         let bent = Bent::of_shapes(a, b);
         if bent.since_m(&self.bent) > 0.0 {
@@ -194,7 +194,7 @@ impl CarriedFront {
         }
     }
 
-    /// Goes on at the pose until the goal is reached (true), `slice_units` are spent, or the meter closes.
+    /// Works at this pose until the goal is reached (true), `slice_units` are spent, or the meter closes.
     ///
     /// `a` and `b` are those of [`CarriedFront::start`]. Units: a box against a pack, or two leaves; one each.
     pub fn advance(
@@ -209,7 +209,7 @@ impl CarriedFront {
         self.advance_despite(store, (a, b), (goal, 0.0), slice_units, meter)
     }
 
-    /// As [`CarriedFront::advance`], with `off_m` as [`super::MeshQuery::advance_despite`] has it.
+    /// As [`CarriedFront::advance`], with `off_m` as in [`super::MeshQuery::advance_despite`].
     pub(in crate::narrow) fn advance_despite(
         &mut self,
         store: &mut FrontStore,
@@ -234,7 +234,7 @@ impl CarriedFront {
                 self.set_out(store, (a, b), sides, sought);
                 continue;
             }
-            // Wide apart by now: a verdict needs no more.
+            // Far apart by now: a verdict needs no more.
             if sought > goal && widened(self.interval(), off_m).min > 0.0 {
                 return true;
             }
@@ -247,13 +247,13 @@ impl CarriedFront {
         }
     }
 
-    /// Whether the surfaces are proved apart by no more than `off_m`.
+    /// Whether the surfaces are proved apart, but by no more than `off_m`.
     fn is_apart_within(&self, off_m: f64) -> bool {
         let gap = self.interval();
         gap.min > 0.0 && widened(gap, off_m).min <= 0.0
     }
 
-    /// Makes ready for a goal at this pose.
+    /// Prepares for a goal at this pose.
     fn set_out(
         &mut self,
         store: &mut FrontStore,
@@ -269,11 +269,11 @@ impl CarriedFront {
             && !std::mem::replace(&mut self.known.points_wanted, true)
             && self.known.touches
         {
-            // A verdict ends at the first that touches: there are few.
+            // A verdict ends at the first touch: there are few.
             self.cover.ask_touching_again(&mut store.entries);
         }
         if self.known.points_wanted {
-            // Also for less than contacts: their search, cut off before, goes on with it at this pose.
+            // Also for less than contacts: an interrupted search for them at this pose goes on with it.
             self.known.walks = Some(store.walks.resume(self.known.walks));
         }
     }
@@ -284,13 +284,13 @@ impl CarriedFront {
         self.cover.len()
     }
 
-    /// Whether it was started, and not released since: what it covers may still be lumped together, entry by entry.
+    /// Whether it was started and not released since: what it covers may still be lumped together, entry by entry.
     #[must_use]
     pub fn is_started(&self) -> bool {
         self.started
     }
 
-    /// Whether something found no room, or what was lumped together is used up: nothing but a new start helps.
+    /// Whether an entry found no room, or the lumped entries have expired, so that only a new start helps.
     pub(in crate::narrow) fn is_lost(&self) -> bool {
         self.started && self.cover.is_lost()
     }
@@ -301,7 +301,7 @@ impl CarriedFront {
         self.len() == 0
     }
 
-    /// Everything from the roots, at the pose it is at.
+    /// Starts over from the roots, at the current pose.
     fn start_over(&mut self, store: &mut FrontStore, a: &Shape, b: &Shape) {
         let (Some(side_a), Some(side_b)) = (Side::of(a), Side::of(b)) else {
             return;
@@ -321,12 +321,12 @@ impl CarriedFront {
         self.shells_expiry_m = f64::NEG_INFINITY;
     }
 
-    /// The least depth that the two can have, as they are now.
+    /// The least depth that the two can have at present.
     fn measure_depth(&mut self, a: &Shape, b: &Shape) {
         let (Some(side_a), Some(side_b)) = (Side::of(a), Side::of(b)) else {
             return;
         };
-        // A ball about the deepest point fits into the solid that it is in; pieces part when moved by both radii.
+        // A ball around the deepest point fits into its solid; pieces separate when moved by the sum of both radii.
         let ball = |side: Side<'_>, shape: &Shape| match side {
             Side::Mesh(mesh) if !mesh.is_solid() => 0.0,
             _ => shape.aabb.half_extents().min(),
@@ -339,7 +339,7 @@ impl CarriedFront {
         self.floor_m = -(depth_m * (1.0 + 8.0 * ROUND)) - self.at.slop;
     }
 
-    /// Bounds on the gap of the two as wholes: what an overlapping pair's lower end is.
+    /// Bounds on the gap of the two whole shapes: the lower end for an overlapping pair.
     fn measure_wholes(&mut self, a: (&Shape, Side<'_>), b: (&Shape, Side<'_>)) {
         let ((root_a, origin_a), (root_b, origin_b)) = (tree_of(a.0, a.1), tree_of(b.0, b.1));
         let pos12 = self.at.pos12;

@@ -1,38 +1,38 @@
-//! Leaves that touch or cross; and of a walk the deepest of them, a bounded number.
+//! Leaves that touch or cross; for a walk, a bounded number of the deepest.
 
 use super::Closest;
 use crate::narrow::arena::{Arena, Linked, Run};
 
-/// Leaf contacts that a walk keeps of one shape pair; the shallowest makes room for a deeper one.
+/// Most leaf contacts that a walk keeps of one shape pair; the shallowest is replaced by a deeper one.
 pub const LEAF_CONTACTS_MAX: usize = 64;
 
 /// Two leaves that touch or cross.
 #[derive(Clone, Copy, Debug)]
 pub struct LeafContact {
-    /// How, in A's frame.
+    /// The contact, in A's frame.
     pub closest: Closest,
     /// Triangle of A; `u32::MAX` when A is no mesh.
     pub triangle_a: u32,
     /// Triangle of B; `u32::MAX` when B is no mesh.
     pub triangle_b: u32,
-    /// What meets here, by corners and edges of the shapes; 0: not named.
+    /// Which corners and edges of the shapes meet here; 0: not named.
     pub feature: u64,
-    /// The surface that the normal is of; see [`LeafContact::SPARE`].
+    /// The surface that the normal belongs to; see [`LeafContact::SPARE`].
     pub patch: u32,
-    /// How far out it lies in its patch, where it is kept for that (`patches`), metres.
+    /// How far out it lies in its patch, if it is kept for that (`patches`), metres.
     pub(super) out_m: f64,
 }
 
 impl LeafContact {
-    /// Of no patch: stands for the pair where nothing else does.
+    /// Belongs to no patch: represents the pair if nothing else does.
     pub const SPARE: u32 = u32::MAX;
 }
 
-/// The deepest contacts of one pair met so far.
+/// The deepest contacts of one pair found so far.
 #[derive(Debug, Default)]
 pub(super) struct Contacts {
     kept: Run,
-    /// How many there were that had no room.
+    /// How many found no room.
     pub(super) left_out: u64,
 }
 
@@ -46,7 +46,7 @@ impl Contacts {
         arena.all(&self.kept)
     }
 
-    /// Takes a contact in, or in place of the shallowest where it is deeper.
+    /// Adds a contact, or replaces the shallowest if it is deeper.
     pub(super) fn add(&mut self, arena: &mut Arena<LeafContact>, contact: LeafContact) {
         if self.kept.len() < LEAF_CONTACTS_MAX && arena.push(&mut self.kept, contact) {
             return;

@@ -1,27 +1,27 @@
-//! Whether one shape of a pair lies within the other though their surfaces are apart (law 3.3).
+//! Whether one shape of a pair lies within the other while their surfaces are apart (law 3.3).
 //!
-//! One point of every connected surface is tested against the other solid, both ways. That is enough: were a point
-//! in both shapes, a way out of it would meet the surface of the one within the other, and a connected surface that
-//! crosses nothing is inside as a whole or not at all.
+//! One point of every connected surface is tested against the other solid, both ways. That is enough: if a point were
+//! in both shapes, a path out of it would first meet the surface of one inside the other, and a connected surface that
+//! crosses nothing is inside entirely or not at all.
 
 use super::placed::Placed;
 use super::side::Side;
 use crate::math::{Point, Vec3};
 use crate::shape::Inside;
 
-/// What is known of it.
+/// What is known of containment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Containment {
     /// One of the two may hold a part of the other.
     #[default]
     Open,
-    /// No surface of the one lies in the other.
+    /// No surface of one lies in the other.
     Outside,
     /// One does.
     Inside,
 }
 
-/// The tests, one node at a time. Keeps its memory.
+/// The tests, one node at a time. Reuses its memory.
 #[derive(Debug, Default)]
 pub(super) struct ShellTests {
     state: Containment,
@@ -29,19 +29,19 @@ pub(super) struct ShellTests {
     /// 0: points of A in B; 1: points of B in A; and which point.
     way: usize,
     place: usize,
-    /// A test is under way.
+    /// A test is in progress.
     testing: bool,
-    /// By way: a point that was found far out, and along which direction, own frame; of what has one connected surface.
+    /// By way: a point found far out, and its direction, own frame; only for a shape with one connected surface.
     far: [Option<(Point, Vec3)>; 2],
 }
 
 impl ShellTests {
-    /// Other shapes, or other vertices than were looked at last.
+    /// Call for other shapes, or other vertices than those last used.
     pub(super) fn forget(&mut self) {
         self.far = [None; 2];
     }
 
-    /// Starts; `needed`: false where the outcome is known to be outside.
+    /// Starts; `needed`: false if the outcome is known to be outside.
     pub(super) fn start(&mut self, needed: bool) {
         self.state = if needed {
             Containment::Open
@@ -51,8 +51,7 @@ impl ShellTests {
         (self.way, self.place, self.testing) = (0, 0, false);
     }
 
-    /// A mesh has other vertices now: what was counted of the test under way is of the old ones. Tests that are over
-    /// hold as they did.
+    /// A mesh has new vertices: the counts of the test in progress belong to the old ones. Finished tests stay valid.
     pub(super) fn drop_test(&mut self) {
         self.testing = false;
         self.forget();
@@ -82,7 +81,7 @@ impl ShellTests {
                 return;
             }
             let a_in_b = self.way == 0;
-            // Any point of the surface will do; the one that faces away is mostly out of the other's box.
+            // Any point of the surface will do; the one that faces away is usually outside the other's box.
             let ahead = if a_in_b {
                 at.pos12.translation.vector
             } else {
@@ -106,8 +105,8 @@ impl ShellTests {
         }
     }
 
-    /// The next point to be tested, far along a direction where there is a choice. What was far out a moment ago mostly
-    /// still is, and to look for it is a way down the whole tree.
+    /// The next point to be tested, far along a direction if there is a choice. The last such point is usually still
+    /// far out, and searching for one is a descent through the whole tree.
     fn point_of(&mut self, of: Side<'_>, direction: &Vec3) -> Point {
         let single = of.shell_count() == 1;
         let near = |found: &Vec3| {

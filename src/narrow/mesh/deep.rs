@@ -1,9 +1,9 @@
-//! Two shapes that overlap deep enough for balls within a solid to tell.
+//! Two shapes that overlap deeply enough for inner balls of a solid to prove it.
 //!
 //! In: two shapes of which one is a solid mesh and the other a solid mesh or convex, and a pose of B seen from A. Out:
-//! a lower bound on the depth of their overlap. It costs less than a box against a pack, where a search for triangles
-//! that touch takes twenty of these; and as it is a depth and no touch, it holds while the two move by less. Cold, 200
-//! pairs of meshes of which two thirds overlap: 1,930 units for all verdicts in place of 4,060
+//! a lower bound on the depth of their overlap. It costs less than a box against a pack, where a search for touching
+//! triangles takes twenty of these; and since it proves a depth, not a touch, it holds until the two move by that much.
+//! Cold, 200 pairs of meshes of which two thirds overlap: 1,930 units for all verdicts instead of 4,060
 //! (`benches/time_critical`).
 
 use super::lack::Lack;
@@ -14,20 +14,20 @@ use crate::narrow::exact::{Warm, convex_gap};
 use crate::shape::{Ball, Convex, Mesh, Shape};
 use crate::time::Meter;
 
-/// What an exact query of a ball and a convex shape costs, in tests of a box against a pack: when the clock is to be
+/// Cost of an exact query of a ball and a convex shape, in tests of a box against a pack: decides when the clock is
 /// read.
 const CONVEX_COST: u64 = 4;
 
-/// What the balls of one pair last said.
+/// The last ball test of one pair.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Deep {
-    /// It lacked an overlap, or motion enough for one.
+    /// How far it was from proving an overlap.
     lack: Lack,
 }
 
 impl Deep {
-    /// A lower bound on the depth of a point of the one under the surface of the other, metres, positive; `None`: the
-    /// balls do not tell. One unit at most.
+    /// A lower bound on the depth of a point of one under the surface of the other, metres, positive; `None`: the balls
+    /// prove nothing. One unit at most.
     pub(super) fn depth(
         &mut self,
         a: &Shape,
@@ -60,14 +60,14 @@ impl Deep {
     }
 }
 
-/// A lower bound on the depth that two shapes overlap by, metres, positive and rounded down, at a pose by itself;
-/// `None`: balls within them do not tell. One unit at most.
+/// A lower bound on the depth of the overlap of two shapes, metres, positive and rounded down, at a single pose;
+/// `None`: inner balls prove none. One unit at most.
 #[must_use]
 pub fn overlap((a, b): (&Shape, &Shape), pos12: &Pose, meter: &mut Meter<'_>) -> Option<f64> {
     Deep::default().depth(a, b, pos12, meter)
 }
 
-/// Whether there are balls to ask: a convex shape is asked as a whole.
+/// Whether it has inner balls; a convex shape is tested as a whole.
 fn has_balls(side: Side<'_>) -> bool {
     match side {
         Side::Mesh(mesh) => mesh.balls().is_some(),
@@ -82,11 +82,11 @@ fn of_meshes(a: &Mesh, b: &Mesh, at: &Placed) -> Option<f64> {
     let (one, other) = a.balls()?.closest(b.balls()?, &turn, &way.map(f32_near));
     let apart_m = (one.centre - at.to_a(&other.centre)).norm();
     let overlap_m = one.radius_m + other.radius_m - apart_m;
-    // A point of the one ball lies so deep in the other, or its centre does.
+    // A point of one ball lies that deep in the other, or its centre does.
     Some(overlap_m.min(one.radius_m.max(other.radius_m)))
 }
 
-/// The same of a ball of a mesh and a whole convex shape.
+/// The same for a ball of a mesh and a whole convex shape.
 ///
 /// * `middle` - the convex shape's, in the mesh's frame.
 /// * `pos12` - of the convex shape, seen from the mesh.
@@ -105,6 +105,6 @@ fn of_convex(
     let way = pos12.translation.vector - centre.coords;
     let from_ball = Pose::from_parts(way.into(), pos12.rotation);
     let gap = convex_gap(&ball, convex, &from_ball, &mut Warm::default()).gap;
-    // The convex shape holds a point so deep in the ball, or the ball's centre.
+    // The convex shape contains a point that deep in the ball, or the ball's centre.
     Some((-gap.max).min(radius_m))
 }

@@ -1,14 +1,14 @@
 //! The front of a walk: every pair of boxes that is still open, those that may touch on a stack, the others in a heap.
 //!
-//! In: pairs with lower bounds. Out: the next pair to look into, and the least bound of all.
+//! In: pairs with lower bounds. Out: the next pair to open, and the least bound of all.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// Entries of the heap, 16 bytes each; beyond it pairs go to the stack, which is slower and as sound.
+/// Most entries of the heap, 16 bytes each; beyond it pairs go to the stack, which is slower but just as sound.
 const FRONT_MAX: usize = 1 << 20;
 
-/// A pair of nodes, and a lower bound on the gap of what they hold.
+/// A pair of nodes, and a lower bound on the gap of their contents.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
     pub(super) low: f64,
@@ -17,7 +17,7 @@ pub(super) struct Entry {
 }
 
 impl Ord for Entry {
-    /// The least bound is the greatest entry, so that a heap yields it first; ties by place, for equal replays.
+    /// The least bound compares greatest, so that a heap yields it first; ties by place, for equal replays.
     fn cmp(&self, other: &Self) -> Ordering {
         let places = |e: &Self| (e.a, e.b);
         (other.low.total_cmp(&self.low)).then_with(|| places(other).cmp(&places(self)))
@@ -38,7 +38,7 @@ impl PartialEq for Entry {
 
 impl Eq for Entry {}
 
-/// All open pairs. Keeps its memory.
+/// All open pairs. Reuses its memory.
 #[derive(Debug, Default)]
 pub(super) struct Front {
     /// Pairs of boxes that may touch.
@@ -61,7 +61,7 @@ impl Front {
         }
     }
 
-    /// The newest pair that may touch; where there is none, the nearest of the others.
+    /// The newest pair that may touch; if there is none, the nearest of the others.
     pub(super) fn take(&mut self) -> Option<Entry> {
         self.stack.pop().or_else(|| self.heap.pop())
     }

@@ -1,7 +1,7 @@
 //! A mesh against a half-space: the least height of a vertex over the plane, down the tree.
 //!
-//! For a surface each triangle is a convex pair with the half-space. For a solid the deepest vertex decides too: a
-//! ball in the solid about a point under the plane reaches down to a point of the solid at least its radius deeper.
+//! For a surface each triangle is a convex pair with the half-space. For a solid the deepest vertex decides too: a ball
+//! in the solid around a point under the plane reaches down to a point of the solid at least its radius deeper.
 
 use super::contacts::LeafContact;
 use super::patches::Patches;
@@ -13,10 +13,10 @@ use crate::narrow::widen::widened;
 use crate::shape::{Below, Mesh, NODES_WAITING_MAX};
 use crate::time::Meter;
 
-/// A vertex: its height over the plane, metres; where; of which triangle; its place in the mesh.
+/// A vertex: its height over the plane, metres; its point; its triangle; its index in the mesh.
 type Lowest = (f64, Point, u32, u32);
 
-/// A mesh as it stands over the plane.
+/// A mesh at a pose over the plane.
 #[derive(Clone, Copy, Debug, Default)]
 struct Stand {
     /// Pose of the mesh seen from the half-space.
@@ -28,7 +28,7 @@ struct Stand {
     down_there: Vec3,
     /// Height of the tree's origin over the plane, metres.
     origin_height_m: f64,
-    /// By how much a height may be off, metres; not finite where no height is known.
+    /// Error bound of heights, metres; not finite if no height is known.
     slop: f64,
 }
 
@@ -37,16 +37,16 @@ struct Stand {
 pub(super) struct HalfSpaceWalk {
     waiting: Waiting,
     stand: Stand,
-    /// Vertices up to this height count as contacts, metres: of a body at rest all do, though rounding lifts some.
+    /// Vertices up to this height count as contacts, metres: at rest all must, though rounding lifts some.
     near_m: f64,
-    /// Least height met, metres; where; which triangle.
+    /// Least height found, metres; its point; its triangle.
     lowest: Option<Lowest>,
     /// Whether all vertices under the plane are wanted, not only the lowest.
     collects: bool,
     contacts: Patches,
 }
 
-/// Nodes that may hold a lower vertex, and the least height in each, metres: a stack.
+/// A stack of nodes that may hold a lower vertex, with the least height in each, metres.
 #[derive(Debug)]
 struct Waiting {
     nodes: [(f64, u32); NODES_WAITING_MAX],
@@ -67,7 +67,7 @@ impl Waiting {
         &self.nodes[..self.len]
     }
 
-    /// The root alone.
+    /// Restarts with the root alone.
     fn start(&mut self, low: f64) {
         (self.nodes[0], self.len) = ((low, 0), 1);
     }
@@ -94,7 +94,7 @@ impl Stand {
         };
         let down_there = -normal;
         let origin = mesh.places_origin();
-        // Of a mesh that deforms the origin is its frame's, and the vertices may be far from there.
+        // The origin of a mesh that deforms is its frame's, and the vertices may be far from there.
         let far = origin.coords.norm().max(mesh.centre().coords.norm());
         let size = pose.translation.vector.norm() + offset.abs() + far + mesh.radius();
         Self {
@@ -152,12 +152,12 @@ impl HalfSpaceWalk {
         self.collects = false;
         self.contacts.clear();
         self.waiting.start(self.bound(mesh, 0));
-        // Any vertex bounds the least from above.
+        // The height of any vertex is an upper bound.
         self.offer(mesh, 0, None);
         self.stand.slop.is_finite()
     }
 
-    /// Goes on until the goal is reached (true), `end_units` are spent in all, or the meter closes.
+    /// Works until the goal is reached (true), `end_units` are spent in all, or the meter closes.
     ///
     /// * `off_m` - see [`super::MeshQuery::advance_despite`].
     pub(super) fn advance(
@@ -169,7 +169,7 @@ impl HalfSpaceWalk {
         meter: &mut Meter<'_>,
     ) -> bool {
         if goal == Goal::Contacts && !self.collects {
-            // All vertices under the plane are wanted: the walk begins again, and what is known stays known.
+            // All vertices under the plane are wanted: the walk starts again, and the known interval is kept.
             self.collects = true;
             self.waiting.start(self.interval().min + self.stand.slop);
         }
@@ -195,12 +195,12 @@ impl HalfSpaceWalk {
         self.contacts.all(arena)
     }
 
-    /// The block that its contacts are in.
+    /// The block of its contacts.
     pub(super) fn run(&self) -> &Run {
         self.contacts.run()
     }
 
-    /// Gives its memory back.
+    /// Releases its memory.
     pub(super) fn release(&mut self, arena: &mut Arena<LeafContact>) {
         self.contacts.release(arena);
     }
@@ -215,7 +215,7 @@ impl HalfSpaceWalk {
         Interval::new(low - self.stand.slop, high + self.stand.slop)
     }
 
-    /// The lowest vertex met so far, in A's frame.
+    /// The lowest vertex found so far, in A's frame.
     pub(super) fn witness(&self) -> Option<LeafContact> {
         self.lowest.map(|l| self.stand.contact(&l))
     }
@@ -231,7 +231,7 @@ impl HalfSpaceWalk {
         }
         match mesh.below(place) {
             Below::Row(..) => {
-                // Sorted in: the lowest on top, it is the next to be looked into.
+                // Insertion sort: the lowest on top is opened next.
                 let from = self.waiting.len;
                 mesh.each_below(place, |child| {
                     let low = self.bound(mesh, child).max(bound);
@@ -246,7 +246,7 @@ impl HalfSpaceWalk {
                     (self.bound(mesh, left).max(bound), left),
                     (self.bound(mesh, right).max(bound), right),
                 );
-                // The lower one on top: it is the next to be looked into.
+                // The lower one on top: it is opened next.
                 let (far, near) = if left.0 < right.0 {
                     (right, left)
                 } else {

@@ -1,12 +1,11 @@
-//! A glance that told nothing, and how far the pair has to move before it can.
+//! A failed cheap test, and how far the pair must move before it can succeed.
 
 use super::placed::moved;
 use crate::math::Pose;
 use crate::narrow::bent::Bent;
 use crate::shape::Shape;
 
-/// The pose of the glance, what the two had deformed and their boxes drawn back, and what it lacked, metres; or nothing
-/// is known.
+/// The pose of the test, the deformation and box shrinking by then, and what was lacking, metres; or nothing is known.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lack(Option<(Pose, Bent, f64)>);
 
@@ -17,7 +16,7 @@ impl Lack {
         Self((lack_m > 0.0).then(|| (*pos12, Bent::of_wholes(shed_m), lack_m)))
     }
 
-    /// Whether it would tell nothing at this pose either, with the vertices of now.
+    /// Whether it would fail at this pose too, with the present vertices.
     pub(super) fn holds(&self, a: &Shape, b: &Shape, pos12: &Pose) -> bool {
         let still = |(then, bent, lack_m): &(Pose, Bent, f64)| {
             moved(a, b, then, pos12) + Bent::of_wholes([a.shed_m(), b.shed_m()]).since_m(bent)

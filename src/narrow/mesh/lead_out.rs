@@ -1,16 +1,16 @@
-//! Out of a solid: where the nearest of two surfaces are says where an overlap ends, but not how deep it is.
+//! The way out of a solid: the nearest place of two surfaces shows where an overlap ends, but not how deep it is.
 //!
 //! In: the nearest or deepest leaves of a solid mesh and a convex shape that overlap. Out: the same with the normal
-//! that leads out of the solid, and the depth of that point of the convex shape which lies deepest along it. By its
-//! leaf alone a ball whose centre is within would be pushed further in, and one that is wholly within would be as deep
-//! as its surface is near.
+//! that leads out of the solid, and the depth of the convex shape's deepest point along it. By its leaf alone, a ball
+//! whose centre is inside would be pushed further in, and one that is entirely inside would be only as deep as its
+//! surface is near.
 
 use super::side::Side;
 use super::{Closest, LeafContact};
 use crate::math::{Interval, Point, Pose, Vec3};
 use crate::shape::{Mesh, Shape};
 
-/// Out of the solid; `None`: neither is one with what is convex in it, or the leaf leads out as it is.
+/// The way out of the solid; `None`: neither is a solid with a convex shape in it, or the leaf leads out as it is.
 pub(in crate::narrow) fn lead_out(
     leaf: &LeafContact,
     (a, b): (&Shape, &Shape),
@@ -60,18 +60,18 @@ pub(in crate::narrow) fn lead_out(
 struct Way {
     /// Unit, out of the solid.
     normal: Vec3,
-    /// On the solid's surface, or the plane that it has where it is nearest.
+    /// On the solid's surface, or on its plane at the nearest place.
     on: Point,
-    /// Of the other one, straight across.
+    /// The deepest point of the other shape, opposite `on`.
     deepest: Point,
     gap_m: f64,
 }
 
-/// In the frame of the solid.
+/// The way out, in the solid's frame.
 ///
 /// * `on` - a point of its surface, and the triangle there.
-/// * `normal` - unit, from it to the other one's nearest point or against that.
-/// * `deepest` - the other one's farthest point along a direction.
+/// * `normal` - unit, from `on` towards the other shape's nearest point, or opposite to that.
+/// * `deepest` - the other shape's farthest point along a direction.
 fn way(
     mesh: &Mesh,
     (on, triangle): (&Point, u32),

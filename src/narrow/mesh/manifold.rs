@@ -1,17 +1,17 @@
-//! The contact points of two leaves: with the normal of the surface they are of, not that of a triangle by itself.
+//! The contact points of two leaves, with the normal of their surface rather than that of a single triangle.
 //!
-//! In: a triangle of a mesh and a convex shape, or two triangles, that touch or cross, and the answer of their own
-//! query. Out: points with a normal, each named by the corners and edges that meet there.
+//! In: a triangle of a mesh and a convex shape, or two triangles, that touch or cross, and the result of their query.
+//! Out: points with a normal, each named by the corners and edges that meet there.
 //!
-//! A triangle by itself has edges; most of them are none of the surface's. Pushed in by a millimetre at such an edge,
-//! the least translation of the two leaves leads sideways, along the surface. So a normal counts by how far the two
+//! A single triangle has edges, most of which are not edges of the surface. Pushed in by a millimetre at such an edge,
+//! the least translation of the two leaves leads sideways, along the surface. So a normal is rated by how far the two
 //! would have to move along it if each were followed over its neighbours to where it reaches farthest (`Mesh::climb`):
 //! along a flat floor that is far, at a convex ridge nothing is added. The least of these wins:
-//! - the normals of the faces, against how far the other one reaches behind the face's plane;
-//! - the leaves' own normal: edges, corners, and what is round.
+//! - the normals of the faces, by how far the other shape reaches behind the face's plane;
+//! - the leaves' own normal: edges, corners, and round shapes.
 //!
-//! Refused: a table of Voronoi regions for each edge (a corner that pokes through a face is of no region of it); to
-//! take the face's normal everywhere (a box on a ridge would tilt to one of its sides).
+//! Refused: a table of Voronoi regions for each edge (a corner that pokes through a face is in none of its regions);
+//! using the face's normal everywhere (a box on a ridge would tilt to one of its sides).
 
 mod leaf;
 mod nearest;
@@ -29,30 +29,30 @@ use crate::narrow::arena::Arena;
 use crate::narrow::exact::{ManifoldPoint, PREDICTION, shared_by_triangles, shared_points};
 use crate::shape::{Climb, Mesh, Trails};
 
-/// An own normal this close to a face's (cosine of 0.1 degrees) is the face's.
+/// An own normal this close to a face's (cosine of 0.1 degrees) counts as the face's.
 const FACE: f64 = 0.999_998;
 /// A solid's surface does not push inwards (cosine; a little more than a right angle is rounding).
 const INWARD: f64 = -0.1;
-/// Where nothing of a surface is found beneath a vertex, none is along a normal as close as this (cosine of 4 degrees).
+/// If no surface is found beneath a vertex, there is none along a normal this close either (cosine of 4 degrees).
 const SAME_FOOT: f64 = 0.9976;
-/// A later normal has to be better by this share of the smaller one's radius.
+/// A later normal must be better by this share of the smaller one's radius.
 const BETTER: f64 = 1e-9;
 
-/// What the walks of one search for contact points have come to.
+/// The walks of one search for contact points, as far as they have come.
 #[derive(Debug, Default)]
 pub(super) struct Walks {
     /// Over A and over B to where they reach farthest.
     tops: [Trails<Climb>; 2],
-    /// From vertices of A and of B to the face of the other beneath them, if there is one.
+    /// From vertices of A and of B to the face of the other beneath them, if any.
     feet: [Trails<Option<u32>>; 2],
-    /// Number of the search that they are of.
+    /// Number of the search that they belong to.
     search: u64,
 }
 
 impl Walks {
-    /// Goes on with a search, or begins one: it is not to rest on what others have found. Returns its number.
+    /// Continues a search, or begins one: it must not use the walks of another. Returns its number.
     ///
-    /// * `search` - what was returned last for the two at this pose, if anything was.
+    /// * `search` - the number last returned for the two at this pose, if any.
     pub(super) fn resume(&mut self, search: Option<u64>) -> u64 {
         if search != Some(self.search) {
             self.tops.iter_mut().for_each(Trails::clear);
@@ -71,23 +71,23 @@ impl Walks {
     }
 }
 
-/// Whose face the normal is of.
+/// The leaf whose face normal is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Base {
     A,
     B,
-    /// Of none: the leaves' own.
+    /// Neither: the leaves' own normal.
     Own,
 }
 
-/// Hands over the points of two leaves that touch: at least one. They are in A's frame, and `patch` names the surface
-/// that the normal is of.
+/// Passes on the points of two leaves that touch: at least one. They are in A's frame, and `patch` names the surface
+/// that the normal belongs to.
 ///
-/// It takes up to ten walks, each of some microseconds.
+/// It takes up to ten walks of some microseconds each.
 ///
-/// * `go_on` - asked between and within walks; where not, it is left off, to be begun again over the trails of what was
-///   walked.
-/// * returns - whether it came to its end.
+/// * `go_on` - called between and within walks; if false, the work stops, to be started again with the trails of the
+///   walks so far.
+/// * returns - whether it was finished.
 pub(super) fn points(
     a: (Side<'_>, u32),
     b: (Side<'_>, u32),
@@ -99,7 +99,7 @@ pub(super) fn points(
 ) -> bool {
     let [a, b] = [(a, false), (b, true)].map(|(leaf, is_b)| Leaf::new(leaf, is_b, at));
     let size = a.side.radius().min(b.side.radius());
-    // Rounding is a share of all, not of the smaller one.
+    // Rounding is relative to the whole, not to the smaller one.
     let rounding_m = 4.0 * at.slop;
     let better_m = rounding_m.max(BETTER * size);
     let Some(chosen) = choose(&a, &b, &found.closest, better_m, (walks, go_on)) else {
@@ -111,7 +111,7 @@ pub(super) fn points(
         _ if a.mesh().is_some() => a.patch(),
         _ => b.patch(),
     };
-    // To walk to it is far, and often in vain.
+    // A walk to it is long, and often fails.
     let top = top.filter(|(_, depth_m)| patches.misses(arena, (patch, &normal), *depth_m));
     let mut any = false;
     let mut put = |point_a: Point, point_b: Point, feature: u64| {
@@ -173,11 +173,11 @@ struct Chosen {
     /// Unit, A to B.
     normal: Vec3,
     base: Base,
-    /// The vertex of the other one that lies deepest behind the base's face, where that is a mesh, and how deep.
+    /// The vertex of the other mesh, if it is one, that lies deepest behind the base's face, and its depth.
     top: Option<(u32, f64)>,
 }
 
-/// The normal, A to B, along which the two surfaces overlap least; `None`: left off, see [`points`].
+/// The normal, A to B, along which the two surfaces overlap least; `None`: stopped, see [`points`].
 fn choose(
     a: &Leaf<'_>,
     b: &Leaf<'_>,
@@ -264,7 +264,7 @@ fn shared(
     );
 }
 
-/// What a clipped point is called: a corner of the one, or where two edges cross.
+/// Name of a clipped point: a corner of one leaf, or where two edges cross.
 fn feature_of(a: &Leaf<'_>, b: &Leaf<'_>, feature: u32, base_is_b: bool) -> u64 {
     let (base, incident) = if base_is_b { (b, a) } else { (a, b) };
     let (corner, cut) = (feature & 0x7fff, feature >> 15 & 0xffff);
@@ -274,9 +274,9 @@ fn feature_of(a: &Leaf<'_>, b: &Leaf<'_>, feature: u32, base_is_b: bool) -> u64 
     }
 }
 
-/// Corners of `of` behind the surface about `on`, and `top`, the one that lies deepest: a triangle that pokes through
-/// the surface has its corners over other triangles than the one that it crosses. Returns whether it came to its end,
-/// see [`points`].
+/// Corners of `of` behind the surface around `on`, and `top`, the deepest one: a triangle that pokes through the
+/// surface has its corners over other triangles than the one it crosses. Returns whether it was finished, see
+/// [`points`].
 fn corners(
     (on, of): (&Leaf<'_>, &Leaf<'_>),
     normal: &Vec3,

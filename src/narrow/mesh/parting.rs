@@ -1,17 +1,17 @@
-//! A plane between two shapes, found again at each pose from where it was at the last.
+//! A separating plane of two shapes, searched at each pose from the last one.
 //!
-//! In: two shapes of which at least one is a mesh, and one pose after the other. Out: a lower bound on their gap where
-//! a plane parts them as wholes. What is left to the fronts are pairs that reach into one another's hollows, or are as
-//! near as the tables are coarse.
+//! In: two shapes of which at least one is a mesh, and successive poses. Out: a lower bound on their gap where a plane
+//! separates them. The fronts only get pairs that reach into one another's hollows, or are closer than the tables'
+//! resolution.
 //!
-//! How far a whole reaches along a direction is known from a table or from a support point (`Side::reach`), so that a
-//! direction costs half of what a box against a pack does. `n . between` less what the two reach is a concave function
-//! of `n` but for the table's cells: where a plane parts them, ways uphill lead to one. So the climb is a compass in
-//! the plane across `n`, which stops at the first direction that parts, or at a ridge that it cannot follow. A pair
-//! that is new is asked along the line between its middles only: most that touch are found out by less than a climb
-//! costs.
+//! The reach of a whole shape along a direction comes from a table or a support point (`Side::reach`), so that a
+//! direction costs half of what a box against a pack does. `n . between` less the reach of both is a concave function
+//! of `n`, except for the table's cells: if a separating plane exists, going uphill leads to one. So the climb is a
+//! compass search in the plane orthogonal to `n`; it stops at the first direction that separates, or at a ridge that it
+//! cannot follow. A new pair is tested along the line between its middles only: most pairs that touch are decided by
+//! less work than a climb.
 //!
-//! Refused: the closest points of the two hulls (a query of its own, where a sign is all that is asked).
+//! Refused: the closest points of the two hulls (a query of its own, where only a sign is needed).
 
 use super::lack::Lack;
 use super::placed::Placed;
@@ -21,14 +21,14 @@ use crate::math::{Pose, Vec3};
 use crate::shape::Shape;
 use crate::time::Meter;
 
-/// Directions tried in one climb: a warm one mostly needs one.
+/// Most directions tried in one climb: a warm one usually needs one.
 const TRIES_MAX: u64 = 12;
-/// First step of the compass, radians: what two bodies turn by in some ticks.
+/// First step of the compass, radians: what two bodies rotate by in a few ticks.
 const STEP: f64 = 0.12;
-/// Least step: a table is no better.
+/// Least step: a table is no finer.
 const STEP_MIN: f64 = 0.01;
-/// What one direction costs, in quarters of a test of a box against a pack: when the clock is to be read. So many
-/// points of a convex shape, each of which is asked, cost another quarter.
+/// Cost of one direction, in quarters of a test of a box against a pack: decides when the clock is read. Each
+/// `POINTS_A_QUARTER` points of a convex shape cost another quarter.
 const TRY_COST_QUARTERS: u64 = 2;
 /// As [`TRY_COST_QUARTERS`].
 const POINTS_A_QUARTER: usize = 16;
@@ -38,8 +38,8 @@ const POINTS_A_QUARTER: usize = 16;
 pub(super) struct Parting {
     /// Unit, A's frame, from A to B; `None`: never looked for.
     normal: Option<Vec3>,
-    /// Where none was found last, and how far the climb's end was from one: a shorter motion brings none about there,
-    /// and is not worth another climb.
+    /// The last failed search, and how far its end was from a separating plane: a shorter motion cannot yield one
+    /// there, so another climb is not worthwhile.
     lack: Lack,
 }
 
@@ -101,8 +101,8 @@ impl Parting {
     }
 }
 
-/// A lower bound on the gap of two shapes of which one is a mesh, positive and rounded down, at a pose by itself;
-/// `None`: no plane that parts them was found. Two units at most.
+/// A lower bound on the gap of two shapes of which one is a mesh, positive and rounded down, at a single pose; `None`:
+/// no separating plane was found. Two units at most.
 #[must_use]
 pub fn parted((a, b): (&Shape, &Shape), pos12: &Pose, meter: &mut Meter<'_>) -> Option<f64> {
     a.mesh().or(b.mesh())?;
@@ -111,7 +111,7 @@ pub fn parted((a, b): (&Shape, &Shape), pos12: &Pose, meter: &mut Meter<'_>) -> 
     line.or_else(|| meter.open().then(|| parting.low(a, b, pos12, meter))?)
 }
 
-/// Four unit directions at right angles to a unit vector.
+/// Four unit directions orthogonal to a unit vector.
 fn across(normal: &Vec3) -> [Vec3; 4] {
     let one = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();
     let other = normal.cross(&one);
@@ -156,7 +156,7 @@ mod tests {
         assert!(low.is_some_and(|low| low <= 0.6), "{low:?}");
     }
 
-    /// The box is what was lacking, and it draws back without any way of a vertex.
+    /// The box was the obstacle, and it shrinks without any vertex moving.
     #[test]
     fn bug_a_plane_that_was_missed_is_looked_for_again_where_a_box_has_drawn_back() {
         let (mut a, b) = (sheet(), sheet());

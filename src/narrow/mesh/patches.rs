@@ -1,33 +1,33 @@
-//! The contact points of a mesh pair as they come in: of each patch the deepest and the outermost.
+//! The contact points of a mesh pair as they are found: of each patch the deepest and the outermost.
 //!
-//! In: points of leaves, in any order and of any number. Out: a bounded number of them that spans what all of them
-//! span. A patch is made of points on one smooth region with normals within 8 degrees of its first; which of its points
-//! make the manifold is decided when all are there (`narrow/contacts`).
+//! In: points of leaves, in any order and number. Out: a bounded number of them with the same span. A patch consists of
+//! points on one smooth region with normals within 8 degrees of its first; once all are found, `narrow/contacts`
+//! decides which of its points make the manifold.
 //!
-//! Refused: the deepest points alone (of a floor of many small triangles these lie side by side, and a body tips over
-//! them); clusters by distance (their middles are not where the rim is).
+//! Refused: the deepest points alone (on a floor of many small triangles these lie close together, and a body tips over
+//! them); clusters by distance (their centres are not where the rim is).
 
 use super::contacts::LeafContact;
 use crate::math::Vec3;
 use crate::narrow::arena::{Arena, Run};
 use crate::narrow::contacts::SAME_NORMAL;
 
-/// Patches of one shape pair; of more, those with normals nearest to one another are taken together.
+/// Most patches of one shape pair; beyond that, those with the nearest normals are merged.
 pub const PATCHES_MAX: usize = 16;
-/// Directions in a patch's plane in each of which the outermost point is kept: a polygon with angles of more than 135
-/// degrees can lose a corner, at most 8 % of its width.
+/// Directions in a patch's plane in each of which the outermost point is kept: a polygon with angles above 135 degrees
+/// can lose a corner, at most 8 % of its width.
 const DIRECTIONS: usize = 8;
 /// Points of a patch: its first, its deepest, its outermost. Some may be the same.
 pub const PATCH_POINTS: usize = DIRECTIONS + 2;
 
-/// The points of one pair met so far.
+/// The points of one pair found so far.
 #[derive(Debug, Default)]
 pub(super) struct Patches {
     kept: Run,
 }
 
 impl Patches {
-    /// The block that they are in.
+    /// Their block.
     pub(super) fn run(&self) -> &Run {
         &self.kept
     }
@@ -42,12 +42,12 @@ impl Patches {
         &all[..all.len() / PATCH_POINTS * PATCH_POINTS]
     }
 
-    /// Takes a point into its patch.
+    /// Adds a point to its patch.
     pub(super) fn add(&mut self, arena: &mut Arena<LeafContact>, point: &LeafContact) {
         let all = arena.all_mut(&self.kept);
         let spare = all.first().is_some_and(|p| p.patch == LeafContact::SPARE);
         if spare && point.patch != LeafContact::SPARE {
-            // The first of its patch, from which the others lie so far out.
+            // The first of its patch; the distances of the others are measured from it.
             all.fill(LeafContact {
                 out_m: 0.0,
                 ..*point
@@ -70,8 +70,8 @@ impl Patches {
         }
     }
 
-    /// Whether it is worth a long walk to a point of this surface and normal: its patch has none as deep, and there is
-    /// room for that patch.
+    /// Whether a long walk to a point of this surface and normal is worthwhile: its patch has none as deep, and has
+    /// room.
     pub(super) fn misses(
         &self,
         arena: &Arena<LeafContact>,
@@ -85,7 +85,7 @@ impl Patches {
         }
     }
 
-    /// Begins a patch; false where there is no room.
+    /// Begins a patch; false if there is no room.
     fn begin(&mut self, arena: &mut Arena<LeafContact>, point: &LeafContact) -> bool {
         let before = self.kept.len();
         for _ in 0..PATCH_POINTS {
@@ -105,24 +105,24 @@ impl Patches {
         true
     }
 
-    /// Gives its memory back.
+    /// Releases its memory.
     pub(super) fn release(&mut self, arena: &mut Arena<LeafContact>) {
         arena.release(&mut self.kept);
     }
 }
 
-/// Where a point belongs.
+/// The patch a point belongs to.
 #[derive(Clone, Copy, Debug)]
 enum Goes {
-    /// Into this patch.
+    /// This patch.
     Into(usize),
-    /// Into one of its own; where there is no room for that, into this one, which has the nearest normal.
+    /// A new patch; if there is no room for one, this patch, which has the nearest normal.
     Beside(usize),
-    /// Into the first.
+    /// The first patch.
     First,
 }
 
-/// Where a point of a surface and with a normal belongs among all.
+/// The patch for a point with this surface and normal.
 fn goes(all: &[LeafContact], spare: bool, surface: u32, normal: &Vec3) -> Goes {
     let (mut nearest, mut best) = (Goes::First, f64::NEG_INFINITY);
     for (at, patch) in all.chunks_exact(PATCH_POINTS).enumerate() {
@@ -144,7 +144,7 @@ pub fn numbered(all: &[LeafContact]) -> impl Iterator<Item = (&LeafContact, u32)
         .flat_map(|(number, patch)| patch.iter().map(move |point| (point, number)))
 }
 
-/// Puts a point where it is deeper or lies farther out than what is there.
+/// Stores a point wherever it is deeper or lies farther out than the stored one.
 fn update(patch: &mut [LeafContact], point: &LeafContact) {
     let [first, deepest, outermost @ ..] = patch else {
         return;
@@ -165,8 +165,8 @@ fn update(patch: &mut [LeafContact], point: &LeafContact) {
     }
 }
 
-/// Cosine and sine of half of the directions, evenly spread and along no axis of the frame: two corners of what is
-/// drawn along the axes are never equally far out. The other half is opposite.
+/// Cosine and sine of half of the directions, evenly spread and along no axis of the frame: two corners of an
+/// axis-aligned model are never equally far out. The other half are their opposites.
 const TURNS: [(f64, f64); DIRECTIONS / 2] = [
     (0.972, 0.233),
     (0.522, 0.853),
@@ -174,7 +174,7 @@ const TURNS: [(f64, f64); DIRECTIONS / 2] = [
     (-0.853, 0.522),
 ];
 
-/// Two directions at right angles to a unit normal and to one another.
+/// Two directions orthogonal to a unit normal and to each other.
 fn across(normal: &Vec3) -> [Vec3; 2] {
     let mut least = Vec3::zeros();
     least[normal.iamin()] = 1.0;

@@ -1,4 +1,4 @@
-//! Where B stands seen from A, ready for points and boxes, with the rounding that stands behind each number.
+//! The pose of B seen from A, prepared for points and boxes, with rounding bounds.
 
 use nalgebra::Matrix3;
 
@@ -16,7 +16,7 @@ pub(in crate::narrow) struct Placed {
     pub(in crate::narrow) translation: Vec3,
     /// Bound on the rounding of any distance computed between the two, metres.
     pub(in crate::narrow) slop: f64,
-    /// How far what is in boxes may be outside of them, both sides together, metres: of meshes that deform.
+    /// How far the contents of boxes may extend beyond them, both sides together, metres: for meshes that deform.
     pub(in crate::narrow) lag_m: f64,
 }
 
@@ -45,7 +45,7 @@ impl Placed {
         }
     }
 
-    /// Of two shapes as they are now.
+    /// Of two shapes in their present state.
     pub(super) fn of(a: &Shape, b: &Shape, pos12: &Pose) -> Self {
         Self {
             lag_m: lag_of(a, b),
@@ -68,8 +68,8 @@ impl Placed {
         self.rotation.tr_mul(direction)
     }
 
-    /// Sound lower bounds on the gaps of what `one` holds and what each box of `pack` holds, metres; zero or less where
-    /// they may touch, and then of no meaning but for an order. Lanes without a box yield anything.
+    /// Sound lower bounds on the gaps of the contents of `one` and of each box of `pack`, metres; zero or less if they
+    /// may touch, and then only meaningful as an order. Lanes without a box yield arbitrary values.
     ///
     /// * `pack_is_b` - the pack is of B and `one` of A, else the other way round.
     pub(in crate::narrow) fn gaps(
@@ -104,7 +104,7 @@ impl Placed {
     }
 }
 
-/// How far what is in boxes may be outside of them, both together, metres, rounded up.
+/// How far the contents of boxes may extend beyond them, both sides together, metres, rounded up.
 pub(super) fn lag_of(a: &Shape, b: &Shape) -> f64 {
     (a.lag_m() + b.lag_m()) * (1.0 + 2.0 * ROUND)
 }

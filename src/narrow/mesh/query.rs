@@ -10,19 +10,19 @@ use crate::narrow::holdings::Holdings;
 use crate::shape::{Geometry, Mesh, Shape};
 use crate::time::Meter;
 
-/// How far work is to go. A later goal can be asked for when an earlier one is reached: of what was done, only leaves
-/// that touch are asked once more, for their contact points.
+/// How far work is to go. A later goal can be set once an earlier one is reached: only touching leaves are queried
+/// again, for their contact points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Goal {
     /// Until the pair is certified colliding or proved apart.
     Verdict,
     /// Until the least distance is exact; an overlapping pair needs no more than its verdict.
     Gap,
-    /// Until all touching or crossing leaf pairs are met, or the least distance is exact.
+    /// Until all touching or crossing leaf pairs are found, or the least distance is exact.
     Contacts,
 }
 
-/// The query; what it keeps is in a [`FrontStore`], the same one from [`MeshQuery::start`] to [`MeshQuery::release`].
+/// The query; its entries are in a [`FrontStore`], the same one from [`MeshQuery::start`] to [`MeshQuery::release`].
 #[derive(Debug)]
 pub struct MeshQuery {
     kind: Kind,
@@ -31,14 +31,14 @@ pub struct MeshQuery {
     front: CarriedFront,
     half_space: HalfSpaceWalk,
     pos12: Pose,
-    /// Which trees the places in `half_space` are of.
+    /// The trees that the places in `half_space` refer to.
     trees: [u32; 2],
     search: Search,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Kind {
-    /// Not started, or a pair that is none of ours: nothing is ever known of it.
+    /// Not started, or an unsupported pair: nothing is ever known of it.
     #[default]
     Idle,
     Surfaces,
@@ -60,7 +60,7 @@ impl Default for MeshQuery {
 }
 
 impl MeshQuery {
-    /// How surfaces are searched from the next start on.
+    /// Sets how surfaces are searched from the next start on.
     pub fn set_search(&mut self, search: Search) {
         self.search = search;
     }
@@ -69,7 +69,7 @@ impl MeshQuery {
     ///
     /// * `pos12` - pose of `b` seen from `a`, unit quaternion.
     ///
-    /// At least one of the two is a mesh; else, or with a pose that is not finite, the interval stays unknown and
+    /// At least one of the two must be a mesh; else, or with a pose that is not finite, the interval stays unknown and
     /// the query never finishes.
     pub fn start(&mut self, store: &mut FrontStore, a: &Shape, b: &Shape, pos12: &Pose) {
         (self.kind, self.gap) = (Kind::Idle, Interval::UNKNOWN);
@@ -86,7 +86,7 @@ impl MeshQuery {
         match (Side::of(a), Side::of(b)) {
             (Some(Side::Convex(_)), Some(Side::Convex(_))) => {}
             (Some(_), Some(_)) => {
-                // A query has one pose: there is nothing to carry.
+                // A query has one pose: nothing is carried.
                 let search = match self.search {
                     Search::Carried => Search::Restart,
                     other => other,
@@ -101,12 +101,12 @@ impl MeshQuery {
         self.narrow();
     }
 
-    /// Goes on until the goal is reached (true), `slice_units` are spent, or the meter closes.
+    /// Works until the goal is reached (true), `slice_units` are spent, or the meter closes.
     ///
     /// `a` and `b` are those of [`MeshQuery::start`]. Units: a node test each, a leaf query each.
     ///
-    /// Where a mesh deforms from turn to turn, each thing found is of the vertices of its turn: the interval then holds
-    /// for those of any one moment when it is widened by what the two have deformed since the start.
+    /// If a mesh deforms from turn to turn, each result refers to the vertices of its turn: the interval then holds for
+    /// those of any one moment when widened by the deformation since the start.
     pub fn advance(
         &mut self,
         store: &mut FrontStore,
@@ -118,9 +118,9 @@ impl MeshQuery {
         self.advance_despite(store, (a, b), (goal, 0.0), slice_units, meter)
     }
 
-    /// As [`MeshQuery::advance`], until a verdict stands also where no point is farther than `off_m` from its place;
-    /// where none does, until the gap is as narrow as it gets. A goal that was reached with an interval that is wide,
-    /// and holds 0 once it is wider by so much, would pass for a touch.
+    /// As [`MeshQuery::advance`], until a verdict stands even if points are displaced by up to `off_m`; if none does,
+    /// until the gap is as narrow as possible. Otherwise a goal reached with a wide interval that holds 0 once widened
+    /// would pass for a touch.
     pub(in crate::narrow) fn advance_despite(
         &mut self,
         store: &mut FrontStore,
@@ -130,7 +130,7 @@ impl MeshQuery {
         meter: &mut Meter<'_>,
     ) -> bool {
         if self.trees != [a.tree_revision(), b.tree_revision()] {
-            // Places in another tree say nothing; what is known of the gap stays known.
+            // Places in another tree mean nothing; what is known of the gap stays valid.
             let (gap, pos12) = (self.gap, self.pos12);
             self.start(store, a, b, &pos12);
             self.gap = gap;
@@ -151,7 +151,7 @@ impl MeshQuery {
         reached
     }
 
-    /// What is known of the gap, metres: sound at any interruption, and never looser than before.
+    /// Interval of the gap, metres: sound at any interruption, and never looser than before.
     #[must_use]
     pub fn interval(&self) -> Interval {
         self.gap
@@ -163,13 +163,13 @@ impl MeshQuery {
         self.kind == Kind::HalfSpace || self.front.is_certain()
     }
 
-    /// Whether what was found touches also where no point is farther than `off_m` from its place; false says nothing.
+    /// Whether the pair still touches if points are displaced by up to `off_m`; false proves nothing.
     pub(in crate::narrow) fn touches_despite(&self, off_m: f64) -> bool {
         self.gap.max + off_m < 0.0
             || (self.kind == Kind::Surfaces && self.front.touches_despite(off_m))
     }
 
-    /// The leaves with the least gap met so far; where one shape is within the other, with the normal that leads out.
+    /// The leaves with the least gap found so far; if one shape is within the other, with the normal that leads out.
     #[must_use]
     pub fn witness(&self) -> Option<LeafContact> {
         match self.kind {
@@ -179,8 +179,8 @@ impl MeshQuery {
         }
     }
 
-    /// Points where leaves touch or cross, [`super::PATCH_POINTS`] of each patch, some twice; those of all leaves once
-    /// `Goal::Contacts` is reached. Of a shape within another: the way out. With each the number of its patch.
+    /// Points where leaves touch or cross, [`super::PATCH_POINTS`] of each patch, with duplicates; those of all leaves
+    /// once `Goal::Contacts` is reached. For a shape within another: the way out. Each with the number of its patch.
     pub fn contacts<'a>(
         &'a self,
         store: &'a FrontStore,
@@ -194,20 +194,20 @@ impl MeshQuery {
         found.chain(within.map(|point| (point, 0)))
     }
 
-    /// Forgets everything and gives its memory back.
+    /// Forgets everything and releases its memory.
     pub fn release(&mut self, store: &mut FrontStore) {
         self.kind = Kind::Idle;
         self.front.release(store);
         self.half_space.release(&mut store.contacts);
     }
 
-    /// Tells what it holds.
+    /// Lists what it holds.
     pub(in crate::narrow) fn tell<'a>(&'a self, held: &mut Holdings<'a>) {
         self.front.tell(held);
         held.leaves.push(self.half_space.run());
     }
 
-    /// A front's bound can be lower by rounding after it was stored: what was known at this pose stays known.
+    /// A front's bound can drop by rounding after it was stored: keep what was known at this pose.
     fn narrow(&mut self) {
         let now = match self.kind {
             Kind::Idle => return,

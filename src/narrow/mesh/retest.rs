@@ -7,7 +7,7 @@ use crate::math::{Point, Pose};
 use crate::narrow::exact::Closest;
 use crate::shape::{Geometry, Node, Shape};
 
-/// The root box of a side and what it is relative to, own frame.
+/// The root box of a side and the origin it refers to, own frame.
 pub(super) fn tree_of(shape: &Shape, side: Side<'_>) -> (Node, Point) {
     match side {
         Side::Mesh(mesh) => (mesh.whole(), mesh.centre()),
@@ -24,11 +24,11 @@ pub(super) fn reach_of(shape: &Shape) -> f64 {
     shape.centre.coords.norm() + shape.radius
 }
 
-/// Queries the leaf pair of last tick's contact again: one unit. `None` when the two have no such leaves.
+/// Queries the leaf pair of last tick's contact again: one unit. `None` if the two have no such leaves.
 ///
-/// The upper end of its interval holds for the two shapes. Where one of them is a solid mesh it says of an overlap no
-/// more than that it is one: the depth of a solid is that of a point, and the translation that parts two leaves can be
-/// more. Over a half-space it is the depth of the triangle's lowest corner.
+/// The upper end of its interval holds for the two shapes. If one is a solid mesh it proves an overlap, but not its
+/// depth: the depth of a solid is that of a point, and the translation that separates two leaves can be more. Over a
+/// half-space it is the depth of the triangle's lowest corner.
 ///
 /// * `triangle_a`, `triangle_b` - of a [`super::Witness`] or [`super::LeafContact`]; `u32::MAX` for a side that is no
 ///   mesh.

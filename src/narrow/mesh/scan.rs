@@ -1,4 +1,4 @@
-//! A look at where two shapes may touch, at any pose: pairs of boxes and what they share.
+//! Where two shapes may touch, at any pose: pairs of boxes and what they share.
 //!
 //! In: two shapes of which at least one is a mesh and none a half-space, or a mesh and a half-space, and what a front
 //! has not proved. Out: spots that hold all that the two surfaces share, the largest split first while tests last.
@@ -16,8 +16,8 @@ use crate::narrow::cover::lanes;
 use crate::shape::{BoxId, Cone, Held, Mesh, Obb, Shape};
 use crate::simd::obb::LANES;
 
-/// Shells of a shape that are asked one by one whether they can lie within the other; of more any may. So many take
-/// two microseconds at most.
+/// Most shells of a shape that are tested one by one for lying within the other; of more, any may. This many take two
+/// microseconds at most.
 const SHELLS_ASKED: usize = 64;
 
 /// Two shapes at a pose.
@@ -29,7 +29,7 @@ pub(in crate::narrow) struct Scan<'a> {
 }
 
 impl<'a> Scan<'a> {
-    /// `None` where one is a half-space.
+    /// `None` if one is a half-space.
     pub(in crate::narrow) fn new(a: &'a Shape, b: &'a Shape, pos12: &Pose) -> Option<Self> {
         let sides = (Side::of(a)?, Side::of(b)?);
         Some(Self {
@@ -40,7 +40,7 @@ impl<'a> Scan<'a> {
         })
     }
 
-    /// Whether `boxes` are a pair of leaves: nothing is left to split.
+    /// Whether `boxes` are a pair of leaves, which cannot be split.
     pub(in crate::narrow) fn is_leaf(&self, (a, b): (BoxId, BoxId)) -> bool {
         let leaf = |side: Side<'_>, id| matches!(side.held(id), Held::Triangle(_));
         leaf(self.sides.0, a) && leaf(self.sides.1, b)
@@ -68,12 +68,12 @@ impl<'a> Scan<'a> {
         Some(Spot { boxes, ..spot })
     }
 
-    /// What the roots share: all of it.
+    /// What the roots share.
     pub(in crate::narrow) fn whole(&self) -> Option<Spot> {
         self.spot(BoxId::ROOT, BoxId::ROOT)
     }
 
-    /// Visits every pair of boxes that a front has not proved apart at this pose; false: it does not know.
+    /// Visits every pair of boxes that a front has not proved apart at this pose; false: it does not know them.
     pub(in crate::narrow) fn unproved(
         &self,
         front: &CarriedFront,
@@ -87,14 +87,14 @@ impl<'a> Scan<'a> {
         front.unproved(store, moved_m, visit)
     }
 
-    /// The spots of the smaller boxes that a pair of boxes holds, but for those that are apart. One test.
+    /// The spots of the child boxes of a pair of boxes, except those that are apart. One test.
     pub(in crate::narrow) fn split(&self, boxes: (BoxId, BoxId), mut take: impl FnMut(Spot)) {
         let (side_a, side_b) = self.sides;
         let (a, b) = (
             side_a.obb(boxes.0, &self.wholes[0]),
             side_b.obb(boxes.1, &self.wholes[1]),
         );
-        // The larger is parted, so that both shrink alike.
+        // The larger is split, so that both shrink alike.
         let size = |obb: &Obb| obb.half.iter().map(|h| h * h).sum::<f32>();
         let (pack, part_b) = match (side_a.held(boxes.0), side_b.held(boxes.1)) {
             (Held::Pack(_), Held::Pack(pack)) if size(&b) > size(&a) => (pack, true),
@@ -114,8 +114,8 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// Where the normals of a contact of two boxes point, from A to B, A's frame: along a normal of a face, edge or
-    /// corner of the one, or against one of the other.
+    /// Possible normals of a contact of two boxes, from A to B, A's frame: along a normal of a face, edge or corner of
+    /// A, or opposite to one of B.
     pub(in crate::narrow) fn normals(&self, (a, b): (BoxId, BoxId)) -> Cone {
         let of_b = |mesh: &Mesh| mesh.normals(b).turned(&self.at.rotation).reversed();
         match self.sides {
@@ -129,9 +129,9 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// Where the one can lie within the other as a whole without their surfaces meeting: all that the two share.
+    /// A place that covers all the two share if one can lie entirely within the other, without their surfaces meeting.
     ///
-    /// * `front` - of these two; what it knows need not be asked.
+    /// * `front` - of these two; what it knows need not be tested.
     pub(in crate::narrow) fn held(&self, front: Option<&CarriedFront>) -> Option<Spot> {
         let (a, b) = self.shapes;
         let single = self.sides.0.shell_count() == 1 && self.sides.1.shell_count() == 1;
@@ -172,7 +172,7 @@ impl<'a> Scan<'a> {
         let ahead = away.try_normalize(self.at.slop).unwrap_or(x);
         let directions = [ahead, x, -x, y, -y, z, -z]
             .map(|direction| (direction, solid.extent(&direction)[0] + self.at.slop));
-        // A surface is not within where any of its points is out: each has one that tells, or may be within.
+        // A surface with any point outside is not within: each has a point that shows this, or may be within.
         let is_out = |place: usize| {
             directions.iter().any(|(direction, reach)| {
                 let point = inner.0.shell_point(place, &to_inner(*direction));
@@ -184,7 +184,7 @@ impl<'a> Scan<'a> {
     }
 }
 
-/// A mesh and a half-space at a pose: what of the boxes lies behind the plane.
+/// A mesh and a half-space at a pose: the parts of the boxes behind the plane.
 pub(in crate::narrow) struct PlaneScan<'a> {
     mesh: &'a Mesh,
     normal: Vec3,
@@ -194,7 +194,7 @@ pub(in crate::narrow) struct PlaneScan<'a> {
 
 impl<'a> PlaneScan<'a> {
     /// * `normal`, `offset` - of the half-space `normal . x <= offset`, in the mesh's frame.
-    /// * `slop_m` - what rounding of the pose can be.
+    /// * `slop_m` - bound on the rounding of the pose.
     pub(in crate::narrow) fn new(mesh: &'a Mesh, normal: Vec3, offset: f64, slop_m: f64) -> Self {
         let size = offset.abs() + mesh.centre().coords.norm() + mesh.radius();
         Self {
@@ -214,7 +214,7 @@ impl<'a> PlaneScan<'a> {
         })
     }
 
-    /// All that lies behind the plane, mesh's frame, the largest boxes split while there is a `test` for each.
+    /// All that lies behind the plane, mesh's frame; the largest boxes are split while `test` allows it.
     pub(in crate::narrow) fn spots(
         &self,
         heap: &mut BinaryHeap<Spot>,
@@ -235,7 +235,7 @@ impl<'a> PlaneScan<'a> {
     }
 }
 
-/// A box that holds what is in one whose mesh has deformed since it was fitted.
+/// A box enlarged to hold the contents of one whose mesh has deformed since it was fitted.
 fn held(obb: &Obb, lag_m: f64) -> Obb {
     if lag_m == 0.0 {
         return *obb;
@@ -246,7 +246,7 @@ fn held(obb: &Obb, lag_m: f64) -> Obb {
     }
 }
 
-/// What of a box lies behind a plane.
+/// The part of a box behind a plane.
 pub(in crate::narrow) fn behind(obb: &Obb, normal: Vec3, offset: f64, slop_m: f64) -> Option<Spot> {
     let slab = Slab {
         normal,

@@ -1,14 +1,14 @@
-//! What two triangles share: the one cut by the plane of the other and by the planes through its sides.
+//! The intersection of two triangles: one cut by the plane of the other and by the planes through its sides.
 
 use super::triangle::Triangle;
 use crate::math::{Point, Vec3};
 use crate::narrow::approx::Spot;
 
-/// Corners of a triangle cut by five planes, at most.
+/// Most corners of a triangle cut by five planes.
 const CORNERS: usize = 8;
 /// Planes are moved out by this share of the size of the two triangles: far above rounding.
 const MARGIN: f64 = 1e-9;
-/// A triangle lower than this share of its longest side has no plane to speak of.
+/// A triangle lower than this share of its longest side has no usable plane.
 const NEEDLE: f64 = 1e-6;
 
 /// A convex polygon.
@@ -22,7 +22,7 @@ impl Polygon {
         &self.corners[..self.len]
     }
 
-    /// What of it lies where `normal . (x - at) <= reach`.
+    /// The part of it where `normal . (x - at) <= reach`.
     fn cut(&self, normal: &Vec3, at: &Point, reach: f64) -> Self {
         let mut left = Self {
             corners: self.corners,
@@ -30,7 +30,7 @@ impl Polygon {
         };
         let height = |p: &Point| normal.dot(&(p - at)) - reach;
         let mut put = |p: Point| {
-            // Of a convex polygon a plane adds one corner; rounding may make one of it twice.
+            // A plane adds one corner to a convex polygon; rounding may duplicate one.
             if left.len < CORNERS {
                 left.corners[left.len] = p;
                 left.len += 1;
@@ -50,8 +50,8 @@ impl Polygon {
     }
 }
 
-/// What two triangles share, both in one frame; `Some(None)`: nothing; `None`: the other one is a needle, and this is
-/// not the way to tell.
+/// What two triangles share, both in one frame; `Some(None)`: nothing; `None`: the other one is a needle, and this
+/// method does not apply.
 pub(super) fn shared(a: &Triangle, b: &Triangle, slop_m: f64) -> Option<Option<Spot>> {
     let sides = [b[1] - b[0], b[2] - b[1], b[0] - b[2]];
     let size_b = sides.iter().map(Vec3::norm).fold(0.0, f64::max);

@@ -25,7 +25,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// The boxes, root first; a convex shape has the one that is handed in.
+    /// The boxes, root first; a convex shape has the one that is passed in.
     pub(super) fn nodes<'n>(self, one: &'n Node) -> &'n [Node]
     where
         'a: 'n,
@@ -44,7 +44,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// The solid mesh that it is; the inside of a convex shape is in its leaf query, a surface has none.
+    /// The solid mesh, if it is one; a convex shape's inside is handled by its leaf query, a surface has none.
     pub(super) fn solid(self) -> Option<&'a Mesh> {
         match self {
             Self::Mesh(mesh) if mesh.is_solid() => Some(mesh),
@@ -60,7 +60,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// How many points are asked for how far it reaches; a mesh has a table.
+    /// How many points a support query visits; 0 for a mesh, which has a table.
     pub(super) fn points(self) -> usize {
         match self {
             Self::Mesh(_) => 0,
@@ -84,7 +84,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// See [`Mesh::shed_m`]; 0 where nothing deforms.
+    /// See [`Mesh::shed_m`]; 0 if nothing deforms.
     pub(super) fn shed_m(self) -> f64 {
         match self {
             Self::Mesh(mesh) => mesh.shed_m(),
@@ -92,7 +92,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// How many points stand for all its connected surfaces.
+    /// How many points represent all its connected surfaces.
     pub(super) fn shell_count(self) -> usize {
         match self {
             Self::Mesh(mesh) => mesh.shells().len(),
@@ -100,7 +100,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// A point of its `place`th connected surface, own frame; far along `direction` where there is but one surface.
+    /// A point of its `place`th connected surface, own frame; far along `direction` if there is only one surface.
     pub(super) fn shell_point(self, place: usize, direction: &Vec3) -> Point {
         match self {
             Self::Mesh(mesh) if mesh.shells().len() == 1 => mesh.outlying(direction),
@@ -109,7 +109,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// A point of it far along a direction of its own frame: a guess, but a point of it in any case.
+    /// A point of it far along a direction of its own frame: not always the farthest, but a point of it in any case.
     pub(super) fn outlying(self, direction: &Vec3) -> Point {
         match self {
             Self::Mesh(mesh) => mesh.outlying(direction),
@@ -118,8 +118,8 @@ impl<'a> Side<'a> {
     }
 }
 
-/// A lower bound on the gap of all of A and all of B, tighter than that of their root boxes: the separation along
-/// the axes of both and along the line between their origins, from how far each truly reaches.
+/// A lower bound on the gap of all of A and all of B, tighter than that of their root boxes: the separation along the
+/// axes of both and along the line between their origins, from their true reach.
 pub(super) fn low(a: (Side<'_>, &Point), b: (Side<'_>, &Point), frame: &Frame) -> f64 {
     let mut best = f64::NEG_INFINITY;
     for axis in frame.axes() {
@@ -135,10 +135,10 @@ pub(super) fn low(a: (Side<'_>, &Point), b: (Side<'_>, &Point), frame: &Frame) -
 
 /// The gap of one triangle (or convex shape) of A and one of B, in A's frame.
 ///
-/// * `beyond_m` - a gap that exceeds this is of no interest; 0: only what touches is.
+/// * `beyond_m` - a gap that exceeds this does not matter; 0: only a touch matters.
 ///
 /// # Errors
-/// A gap proved to be so many metres at least, and more than `beyond_m`.
+/// The proved lower bound on the gap, metres, more than `beyond_m`.
 pub(super) fn leaf(
     a: (Side<'_>, u32),
     b: (Side<'_>, u32),
@@ -168,7 +168,7 @@ pub(super) fn leaf(
                 &mut Warm::default(),
             ))
         }
-        // Not reached: such a pair is none of ours, and nothing is known of it.
+        // Not reached: such a pair has no front, and nothing is known of it.
         (Side::Convex(_), Side::Convex(_)) => Err(f64::NEG_INFINITY),
     }
 }

@@ -1,12 +1,12 @@
 //! The gap of two triangles, with its certificate.
 //!
-//! In: corners in one frame, and the rounding that stands behind them. Out: a [`Closest`]. Triangles that are points
-//! or needles are legal.
+//! In: corners in one frame, and a bound on their rounding. Out: a [`Closest`]. Degenerate triangles (points, needles)
+//! are allowed.
 //!
-//! Apart: the least distance is one of a corner to a triangle or of two edges' inner points; all are tried. The
-//! upper end is the distance of the two points found, whoever found them; the lower end is the separation along an
-//! axis, sound for any axis, so neither rests on the search being right. Crossing: decided by exact signs; the depth
-//! is the least overlap along the axes of the two, and each axis is a sound bound by itself.
+//! Apart: the least distance is that of a corner to a triangle or of two edges' inner points; all are tried. The upper
+//! end is the distance of the two points found, by whatever search; the lower end is the separation along an axis,
+//! sound for any axis; so neither depends on the search being right. Crossing: decided by exact signs; the depth is the
+//! least overlap along the axes of the two, and each axis is a sound bound by itself.
 
 use std::cmp::Ordering;
 
@@ -14,13 +14,13 @@ use super::Closest;
 use crate::math::{Interval, Point, ROUND, Vec3, greater, lesser};
 use crate::shape::side;
 
-/// What is rounded where the squares of two separations are compared, as a share of them: far more than it is.
+/// Relative rounding allowed for when squares of two separations are compared: far more than there is.
 const NEAR: f64 = 1e-12;
 
 /// Three corners.
 pub(super) type Triangle = [Point; 3];
 
-/// Two points and the edges that meet in them: what an axis has to be at right angles to.
+/// Two points and the edges that meet in them: the axis must be orthogonal to these edges.
 struct Candidate {
     square: f64,
     a: Point,
@@ -45,14 +45,14 @@ impl Candidate {
 /// The gap of two triangles.
 ///
 /// * `slop` - bound on the rounding of corners and of distances between them, metres.
-/// * `beyond_m` - a gap that exceeds this is of no interest; 0: only what touches is.
+/// * `beyond_m` - a gap that exceeds this does not matter; 0: only a touch matters.
 ///
 /// # Errors
-/// A gap proved to be so many metres at least, and more than `beyond_m`.
+/// The proved lower bound on the gap, metres, more than `beyond_m`.
 pub(super) fn gap(a: &Triangle, b: &Triangle, slop: f64, beyond_m: f64) -> Result<Closest, f64> {
     let (edges_a, edges_b) = (edges(a), edges(b));
     let (normal_a, normal_b) = (edges_a[0].cross(&edges_a[1]), edges_b[0].cross(&edges_b[1]));
-    // Three cheap axes turn most pairs away.
+    // Three cheap axes rule out most pairs.
     let middle = (b[0] - a[0]) + (b[1] - a[1]) + (b[2] - a[2]);
     let mut best = Best::of(a, b);
     for axis in [middle, normal_a, normal_b] {
@@ -64,12 +64,12 @@ pub(super) fn gap(a: &Triangle, b: &Triangle, slop: f64, beyond_m: f64) -> Resul
     }
 
     if best.apart <= slop && crossing(a, b) {
-        // What crosses is not in one plane: beside the normals its depth is along the cross of two edges.
+        // Crossing triangles are not coplanar: apart from the normals, only crosses of edges can give the depth.
         try_crosses(&mut best, &edges_a, &edges_b);
         return Ok(overlap(&best, a, b, slop));
     }
     if beyond_m <= 0.0 {
-        // Where a proof will do, axes are cheaper than points.
+        // Where a proof is enough, axes are cheaper than points.
         try_all_axes(&mut best, a, b);
         if proved(&best) {
             return Err(best.apart - slop);
@@ -94,18 +94,17 @@ pub(super) fn gap(a: &Triangle, b: &Triangle, slop: f64, beyond_m: f64) -> Resul
     })
 }
 
-/// Whether an edge of the one passes through the other, whatever rounding did to the corners.
+/// Whether an edge of one surely passes through the other, whatever rounding did to the corners.
 ///
-/// * `slop` - no corner is farther from where it should be, metres.
+/// * `slop` - no corner is farther from its true place, metres.
 ///
-/// False says nothing. Some ten times cheaper than the whole answer.
+/// False proves nothing. About ten times cheaper than the full query.
 pub(super) fn surely_crosses(a: &Triangle, b: &Triangle, slop: f64) -> bool {
     surely_pierces(a, b, slop) || surely_pierces(b, a, slop)
 }
 
-/// Whether an edge of `b` surely passes through `a`: its ends on either side of the plane, and all edges of `a` on one
-/// side of it. Five volumes, the signs of which nothing can change; no normal is normalised, for that of a needle is
-/// noise.
+/// Whether an edge of `b` surely passes through `a`: its ends are on both sides of the plane, and all edges of `a` on
+/// one side of it. Five volumes whose signs are certain; no normal is normalised, because that of a needle is noise.
 fn surely_pierces(a: &Triangle, b: &Triangle, slop: f64) -> bool {
     let edges_a = edges(a);
     let normal = edges_a[0].cross(&edges_a[1]);
@@ -125,16 +124,16 @@ fn surely_pierces(a: &Triangle, b: &Triangle, slop: f64) -> bool {
         let along = b[q] - b[p];
         let least = unsure(edge, along.norm() + 2.0 * slop, far + edge, slop);
         let beside = |i: usize| along.dot(&edges_a[i].cross(&(b[p] - a[i])));
-        // As the first says, or not at all: most are turned away by one or two.
+        // All signs must equal the first: one or two rule out most pairs.
         let first = beside(0);
         let sign = f64::copysign(1.0, first);
         first.abs() > least && sign * beside(1) > least && sign * beside(2) > least
     })
 }
 
-/// A volume of three vectors no longer than these has its sign beyond this, whatever is rounded: the corners by `slop`,
-/// and the products (Shewchuk 1997, as `shape::side`; their absolute values sum to less than 1.5 times the product of
-/// the lengths).
+/// The triple product of three vectors no longer than these has a certain sign beyond this, whatever is rounded: the
+/// corners by `slop`, and the products (Shewchuk 1997, as `shape::side`; their absolute values sum to less than 1.5
+/// times the product of the lengths).
 fn unsure(u: f64, v: f64, w: f64, slop: f64) -> f64 {
     16.0 * ROUND * (u * v * w) + 2.5 * slop * (u * v + v * w + w * u) + f64::MIN_POSITIVE
 }
@@ -147,7 +146,7 @@ pub(super) fn edges(t: &Triangle) -> [Vec3; 3] {
 struct Best {
     apart: f64,
     axis: Vec3,
-    /// Corners from the first one of A, whose place is zero: the digits of a common offset are not lost.
+    /// Corners relative to the first one of A: the digits of a common offset are not lost.
     a: [Vec3; 2],
     b: [Vec3; 3],
 }
@@ -162,7 +161,7 @@ impl Best {
         }
     }
 
-    /// How far B lies beyond A along an axis of any length, and A beyond B: by so many of its lengths.
+    /// How far B lies beyond A along an axis of any length, and A beyond B, in units of that length.
     #[inline(always)]
     fn parts(&self, axis: &Vec3) -> [f64; 2] {
         let ([a1, a2], [b0, b1, b2]) = (self.a.map(|p| axis.dot(&p)), self.b.map(|p| axis.dot(&p)));
@@ -177,7 +176,7 @@ impl Best {
         if square <= f64::MIN_POSITIVE {
             return;
         }
-        // Most are no better, which squares tell as well as lengths, but for what is rounded.
+        // Most are no better; squares show that as well as lengths, up to rounding.
         let [one, other] = self.parts(axis);
         let farthest = greater(one, other);
         let [now, there] = [self.apart, farthest].map(|x| x * x.abs());
@@ -195,10 +194,10 @@ impl Best {
     }
 }
 
-/// The axis between the points found, at right angles to the edges that hold them.
+/// The axis between the points found, orthogonal to the edges that hold them.
 fn try_feature_axes(best: &mut Best, found: &Candidate) {
     let square_away = |mut axis: Vec3| {
-        // Twice: what the first round leaves of a nearly parallel pair of edges, the second takes away.
+        // Twice: the second round removes what the first leaves for a nearly parallel pair of edges.
         for edge in found.edges.iter().chain(&found.edges) {
             let length = edge.norm_squared();
             if length > 0.0 {
@@ -215,7 +214,7 @@ fn try_feature_axes(best: &mut Best, found: &Candidate) {
     }
 }
 
-/// Face normals, crosses of edges, and normals of edges within the planes: all that can separate two triangles.
+/// All axes that can separate two triangles: face normals, crosses of edges, and edge normals within the planes.
 fn try_all_axes(best: &mut Best, a: &Triangle, b: &Triangle) {
     let (edges_a, edges_b) = (edges(a), edges(b));
     for (edges, other) in [(&edges_a, &edges_b), (&edges_b, &edges_a)] {
@@ -223,14 +222,14 @@ fn try_all_axes(best: &mut Best, a: &Triangle, b: &Triangle) {
         best.try_axis(&normal);
         for edge in edges {
             best.try_axis(&edge.cross(&normal));
-            // A needle has no normal to speak of; the other's will do.
+            // A needle has no useful normal; the other triangle's will do.
             best.try_axis(&edge.cross(&other[0].cross(&other[1])));
         }
     }
     try_crosses(best, &edges_a, &edges_b);
 }
 
-/// Crosses of edges.
+/// Cross products of edges.
 fn try_crosses(best: &mut Best, edges_a: &[Vec3; 3], edges_b: &[Vec3; 3]) {
     for u in edges_a {
         for v in edges_b {
@@ -242,8 +241,8 @@ fn try_crosses(best: &mut Best, edges_a: &[Vec3; 3], edges_b: &[Vec3; 3]) {
     }
 }
 
-/// Whether an edge of the one passes through the other; exact for the corners as they are. Triangles in one plane are
-/// not found here: their distance is zero.
+/// Whether an edge of one passes through the other; exact for the given corners. Coplanar triangles are not found here:
+/// their distance is zero.
 fn crossing(a: &Triangle, b: &Triangle) -> bool {
     pierces(a, b) || pierces(b, a)
 }
@@ -265,7 +264,7 @@ fn pierces(a: &Triangle, b: &Triangle) -> bool {
     })
 }
 
-/// What two crossing triangles say: the least translation that parts them, and points on both along it.
+/// Result for two crossing triangles: the least translation that separates them, and points on both along it.
 fn overlap(best: &Best, a: &Triangle, b: &Triangle, slop: f64) -> Closest {
     let depth = (-best.apart).max(0.0);
     let deepest = |t: &Triangle, axis: Vec3| {
@@ -280,7 +279,7 @@ fn overlap(best: &Best, a: &Triangle, b: &Triangle, slop: f64) -> Closest {
     };
     let size = (a[1] - a[0]).norm() + (a[2] - a[0]).norm();
     let point_b = deepest(b, -best.axis);
-    // Rounding of the corners can part what only just crosses, and nothing else.
+    // Rounding of the corners can separate only triangles that barely cross.
     let surely = depth > 1e-9 * size + 4.0 * slop || surely_crosses(a, b, slop);
     Closest {
         gap: Interval::new(-depth - slop, if surely { 0.0 } else { slop }),
@@ -324,7 +323,7 @@ fn closest_points(
             if square <= f64::MIN_POSITIVE {
                 continue;
             }
-            // Both places from the cross product: for nearly parallel edges the usual difference of squares is noise.
+            // From the cross product: for nearly parallel edges the usual difference of squares is noise.
             let from = b[j] - a[i];
             let s = from.cross(v).dot(&cross) / square;
             let t = from.cross(u).dot(&cross) / square;
@@ -346,8 +345,8 @@ fn corner(
 ) {
     let square = normal.norm_squared();
     if square > f64::MIN_POSITIVE {
-        // Weights from areas: each is the share of the part opposite its corner. The third is what the others leave of
-        // 1: so this is a point of the triangle, also of one whose normal is noise.
+        // Weights from areas: each is the share of the part opposite its corner. The third is 1 less the others, so
+        // this is a point of the triangle even if its normal is noise.
         let weight = |k: usize| edges[k].cross(&(p - t[k])).dot(normal) / square;
         let (w2, w1) = (weight(0), weight(2));
         if w1 >= 0.0 && w2 >= 0.0 && w1 + w2 <= 1.0 {

@@ -1,4 +1,4 @@
-//! The walk over trees of axis-aligned boxes: its stages and its interval. The twin and the baseline of the fronts.
+//! The walk over trees of axis-aligned boxes: its stages and its interval. The reference and baseline of the fronts.
 
 use super::bound::Frame;
 use super::contacts::{Contacts, LeafContact};
@@ -14,7 +14,7 @@ use crate::time::Meter;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Stage {
-    /// Not started, or a pair that is none of ours.
+    /// Not started, or an unsupported pair.
     #[default]
     Idle,
     Surfaces,
@@ -23,7 +23,7 @@ enum Stage {
     Done,
 }
 
-/// One resumable query of a shape pair at a fixed relative pose. Keeps its memory from query to query.
+/// One resumable query of a shape pair at a fixed relative pose. Reuses its memory from query to query.
 #[derive(Debug, Default)]
 pub struct Walk {
     frame: Frame,
@@ -31,10 +31,10 @@ pub struct Walk {
     front: Front,
     /// Boxes of the sides that are convex.
     one: Option<[Node; 2]>,
-    /// A solid mesh takes part.
+    /// One of the two is a solid mesh.
     solids: bool,
     shells: ShellTests,
-    /// Sound whatever else is known, metres.
+    /// Always sound, metres.
     floor: f64,
     /// Least lower end of the leaf pairs queried, and least upper end of any gap, metres.
     leaf_low: f64,
@@ -53,8 +53,8 @@ impl Walk {
     ///
     /// * `pos12` - pose of `b` seen from `a`, finite, unit quaternion.
     ///
-    /// At least one of the two is a mesh, none a half-space or a mesh that deforms; else, or with a pose that is not
-    /// finite, the interval stays unknown and the walk never finishes.
+    /// At least one of the two must be a mesh, none a half-space or a mesh that deforms; else, or with a pose that is
+    /// not finite, the interval stays unknown and the walk never finishes.
     pub fn start(&mut self, a: &Shape, b: &Shape, pos12: &Pose) {
         self.stage = Stage::Idle;
         self.front.clear();
@@ -76,9 +76,9 @@ impl Walk {
         }
     }
 
-    /// Goes on until the goal is reached (true), `slice_units` are spent, or the meter closes.
+    /// Works until the goal is reached (true), `slice_units` are spent, or the meter closes.
     ///
-    /// `a` and `b` are those of [`Walk::start`]. Units: a node test each, charged cheap; a leaf query each, dear.
+    /// `a` and `b` are those of [`Walk::start`]. Units: a node test (cheap) each, a leaf query (costly) each.
     pub fn advance(
         &mut self,
         a: &Shape,
@@ -99,16 +99,16 @@ impl Walk {
         }
     }
 
-    /// What is known of the gap, metres: sound at any interruption, and never looser than before.
+    /// Interval of the gap, metres: sound at any interruption, and never looser than before.
     ///
-    /// It never loosens because a box's bound is never below that of the box it came from, and both ends hold the
-    /// truth: neither can pass the other.
+    /// It never loosens because a box's bound is never below that of its parent box, and both ends enclose the true
+    /// gap: neither can pass the other.
     #[must_use]
     pub fn interval(&self) -> Interval {
         if self.stage == Stage::Idle {
             return Interval::UNKNOWN;
         }
-        // Surfaces: the least of what is open and what was queried.
+        // Surfaces: the least of the open and the queried pairs.
         let surfaces = self.front.least().min(self.leaf_low).min(self.high);
         let (low, high) = match self.shells.state() {
             Containment::Open => (self.floor, self.high),
@@ -118,15 +118,15 @@ impl Walk {
         Interval::new(low.min(high), high)
     }
 
-    /// Whether 0 in the interval of a reached goal means touching (law 3.4). False where a leaf query near zero could
-    /// not be finished: then the pair stays `possible`.
+    /// Whether 0 in the interval of a reached goal means touching (law 3.4). False if a leaf query near zero could not
+    /// be finished: then the pair stays `possible`.
     #[must_use]
     pub fn is_certain(&self) -> bool {
         self.touches || !self.blurred
     }
 
-    /// The leaf pair with the least gap met so far; its gap is that of two leaves. Where one shape is within the
-    /// other, the surfaces' nearest points met so far, with the normal that leads out.
+    /// The leaf pair with the least gap found so far; its gap is that of two leaves. If one shape is within the other,
+    /// the surfaces' nearest points found so far, with the normal that leads out.
     #[must_use]
     pub fn witness(&self) -> Option<Witness> {
         match (self.witness, self.shells.state()) {
@@ -136,13 +136,13 @@ impl Walk {
     }
 
     /// Leaf pairs that touch or cross, at most [`super::LEAF_CONTACTS_MAX`]; all of them once `Goal::Contacts` is
-    /// reached, but for [`Walk::contacts_left_out`]. In no order. Of a shape within another: the nearest points.
+    /// reached, except [`Walk::contacts_left_out`]. Unordered. For a shape within another: the nearest points.
     #[must_use]
     pub fn contacts(&self) -> &[LeafContact] {
         self.contacts.all(&self.arena)
     }
 
-    /// How many leaf contacts had no room.
+    /// How many leaf contacts found no room.
     #[must_use]
     pub fn contacts_left_out(&self) -> u64 {
         self.contacts.left_out
@@ -157,7 +157,7 @@ impl Walk {
         self.one = Some([root_a, root_b]);
         let wholes = side::low((a.1, &origin_a), (b.1, &origin_b), &self.frame);
         let low = self.frame.low(&root_a, &root_b).max(wholes);
-        // A ball about the deepest point fits into the solid that it is in, so into the box around that.
+        // A ball around the deepest point fits into its solid, so into the box around that.
         let ball = |side: Side<'_>, node: &Node| match side {
             Side::Mesh(mesh) if !mesh.is_solid() => 0.0,
             _ => node.half().min(),
@@ -168,10 +168,10 @@ impl Walk {
         } else {
             low
         };
-        // Wholes apart: nothing can be inside anything.
+        // The whole shapes are apart: nothing can be inside anything.
         self.shells.start(self.solids && low <= 0.0);
 
-        // Any two points of the two are an upper bound: those that face each other.
+        // Any two points give an upper bound: those that face each other.
         let ahead = self.frame.between();
         let point_a = a.1.outlying(&ahead);
         let point_b = self
@@ -212,7 +212,7 @@ impl Walk {
         self.settle_stage();
     }
 
-    /// Moves on to the next stage where this one has nothing left.
+    /// Moves on to the next stage if this one has nothing left.
     fn settle_stage(&mut self) {
         if self.stage == Stage::Surfaces && self.front.is_apart() {
             self.stage = if self.touches {
@@ -225,7 +225,7 @@ impl Walk {
         if self.stage == Stage::Inside && containment != Containment::Open {
             self.stage = Stage::Refine;
         }
-        // Settled when nothing open can beat the best leaf pair.
+        // Settled when no open pair can beat the best leaf pair.
         if self.stage == Stage::Refine
             && self.front.is_apart()
             && self.front.least() >= self.leaf_low
@@ -257,7 +257,7 @@ impl Walk {
             // Not reached: no walk of a mesh that deforms is started.
             (Below::Row(..), _) | (_, Below::Row(..)) => return,
             (Below::Nodes(al, ar), Below::Nodes(bl, br)) => {
-                // The larger is parted, so that both boxes shrink alike.
+                // The larger is split, so that both boxes shrink alike.
                 if node_a.half().norm_squared() >= node_b.half().norm_squared() {
                     [(al, entry.b), (ar, entry.b)]
                 } else {
@@ -267,8 +267,8 @@ impl Walk {
         };
         let bounds = pairs.map(|(i, j)| self.frame.low(&nodes_a[i as usize], &nodes_b[j as usize]));
         meter.charge(2);
-        // The nearer one last, so that it is on top of the stack; by its own bound, for what the parent knew may be
-        // more and is the same for both.
+        // The nearer one last, so that it is on top of the stack; by its own bound, since the parent's may be greater
+        // and is the same for both.
         let order = if bounds[0] <= bounds[1] {
             [1, 0]
         } else {
@@ -292,8 +292,8 @@ impl Walk {
             return;
         };
         self.leaf_low = self.leaf_low.min(closest.gap.min.max(low));
-        // A solid's depth is that of a point, and the translation that parts two leaves can be more: of an overlap
-        // their query proves no more than that it is one.
+        // A solid's depth is that of a point, and the translation that separates two leaves can be more: their query
+        // proves an overlap, but not its depth.
         let high = if self.solids {
             closest.gap.max.max(0.0)
         } else {
@@ -317,7 +317,7 @@ impl Walk {
             self.witness = Some(contact);
         }
         if closest.gap.min <= 0.0 {
-            // Certified, or zero within its rounding: touching collides.
+            // Certified, or zero within rounding: touching counts as colliding.
             if closest.gap.max <= 8.0 * self.frame.placed.slop || closest.finished {
                 self.touches = true;
                 self.contacts.add(&mut self.arena, contact);

@@ -1,20 +1,20 @@
-//! From two triangles of two surfaces the way to where these cross.
+//! The way from two triangles of two surfaces to where the surfaces cross.
 //!
-//! In: two triangles that do not cross. Out: over which sides to go on to the next ones. The planes of the two meet in
-//! a line, which is about where the surfaces cross (a step of Newton's method for two surfaces): a triangle that the
-//! line misses is left over the side that the line lies beyond, and where it meets both, but in different places, one
-//! goes along it towards the other. Nothing is proved here: who comes to an end asks the triangles themselves.
+//! In: two triangles that do not cross. Out: the sides over which to go on to the next ones. The planes of the two meet
+//! in a line, which approximates where the surfaces cross (a step of Newton's method for two surfaces): a triangle that
+//! the line misses is left over the side towards the line; if the line meets both, but in different places, one moves
+//! along it towards the other. Nothing is proved here: the caller tests the triangles at the end of the walk.
 
 use super::triangle::{Triangle, edges};
 use crate::math::Vec3;
 
-/// Planes whose sine is less have no line to go by: its place would be noise.
+/// Planes with a smaller sine between them have no usable line: its place would be noise.
 const SINE_MIN: f64 = 1e-4;
 
-/// Where a walk goes on.
+/// How a walk continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Way {
-    /// The two cross, but for rounding.
+    /// The two cross, up to rounding.
     Cross,
     /// Over these sides, A's and B's.
     Over([Option<u32>; 2]),
@@ -22,7 +22,7 @@ pub(super) enum Way {
     None,
 }
 
-/// The part of a line within a triangle, and the sides by which it comes in and goes out.
+/// The part of a line within a triangle, and the sides by which it enters and leaves.
 #[derive(Clone, Copy)]
 struct Span {
     low: (f64, u32),
@@ -39,7 +39,7 @@ impl Span {
     }
 }
 
-/// A triangle with its normal, and what is inward of its sides.
+/// A triangle with its normal, and the inward directions of its sides.
 struct Face {
     corners: [Vec3; 3],
     normal: Vec3,
@@ -47,7 +47,7 @@ struct Face {
 }
 
 impl Face {
-    /// Corners from `origin`: the digits of a common offset are not lost.
+    /// Corners relative to `origin`: the digits of a common offset are not lost.
     fn of(triangle: &Triangle, origin: &Vec3) -> Self {
         let edges = edges(triangle);
         let normal = edges[0].cross(&edges[1]);
@@ -58,7 +58,7 @@ impl Face {
         }
     }
 
-    /// What of a line in the triangle's plane lies in the triangle.
+    /// The part of a line in the triangle's plane that lies in the triangle.
     fn span(&self, on: &Vec3, along: &Vec3) -> Span {
         let mut span = Span {
             low: (f64::NEG_INFINITY, 0),
@@ -78,7 +78,7 @@ impl Face {
         span
     }
 
-    /// The side that a point in the triangle's plane lies farthest beyond.
+    /// The side beyond which a point in the triangle's plane lies farthest.
     fn beyond(&self, point: &Vec3) -> Option<u32> {
         let mut least = (0.0, None);
         for (k, (inward, corner)) in (0..).zip(self.inward.iter().zip(&self.corners)) {
@@ -93,18 +93,18 @@ impl Face {
 
 /// The way from two triangles, both in one frame.
 ///
-/// Side `k` of a triangle goes from its corner `k` to the next one.
+/// Side `k` of a triangle runs from its corner `k` to the next one.
 pub(super) fn way(a: &Triangle, b: &Triangle) -> Way {
     let origin = a[0].coords;
     let (a, b) = (Face::of(a, &origin), Face::of(b, &origin));
     let (aa, bb) = (a.normal.norm_squared(), b.normal.norm_squared());
     let ab = a.normal.dot(&b.normal);
     let det = aa * bb - ab * ab;
-    // Also where one has no area, or a number is none.
+    // Also if one has no area, or a number is NaN.
     if det.is_nan() || det <= SINE_MIN * SINE_MIN * aa * bb {
         return Way::None;
     }
-    // The point of both planes nearest to the middle of the two.
+    // The point of both planes nearest to the middle of the two triangles.
     let middle = (a.corners.iter().sum::<Vec3>() + b.corners.iter().sum::<Vec3>()) / 6.0;
     let above_a = a.normal.dot(&(middle - a.corners[0]));
     let above_b = b.normal.dot(&(middle - b.corners[0]));
@@ -131,7 +131,7 @@ pub(super) fn way(a: &Triangle, b: &Triangle) -> Way {
             } else {
                 return Way::Cross;
             };
-            // The longer one's next gets farther; where they are far apart both go.
+            // The step over the longer one gains more; if they are far apart, both move.
             let both = apart > in_a.length() + in_b.length();
             let a_goes = both || in_a.length() >= in_b.length();
             let b_goes = both || !a_goes;
@@ -169,11 +169,11 @@ mod tests {
     #[test]
     fn a_triangle_is_left_towards_where_the_planes_meet() {
         let flat = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Point::from);
-        // Upright at x = 5 and about the plane of the flat one: over the flat one's side that leads there.
+        // Upright at x = 5, crossing the plane of the flat one: leave the flat one over its side towards it.
         let upright = [[5.0, 0.0, -1.0], [5.0, 1.0, -1.0], [5.0, 0.5, 2.0]].map(Point::from);
         assert_eq!(way(&flat, &upright), Way::Over([Some(1), None]));
         assert_eq!(way(&upright, &flat), Way::Over([None, Some(1)]));
-        // The same, all of it above: down over its lower side too.
+        // The same, but entirely above: leave it over its lower side too.
         let above = upright.map(|p| p + Vec3::z() * 2.0);
         assert_eq!(way(&flat, &above), Way::Over([Some(1), Some(0)]));
     }

@@ -1,6 +1,6 @@
-//! Goal: work comes in the order that is stated, and no pair of meshes waits longer for a turn than is stated. Method:
-//! lists and urgencies by hand; and runs of the whole engine under a budget that is far too small, in which the turns
-//! that each pair has had are read after every tick.
+//! Goal: work comes in the stated order, and no pair of meshes waits longer for a turn than stated. Method: lists and
+//! urgencies by hand; and runs of the whole engine under a budget that is far too small, reading after every tick the
+//! number of turns that each pair has had.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -54,7 +54,7 @@ fn urgency(since: Option<u32>, turn: u32, weight: f32, touched: bool) -> Urgency
 #[test]
 fn last_ticks_contacts_have_a_head_start_then_waiting_times_weight() {
     let order = [
-        // Waited for long, and so before contacts.
+        // It has waited long, so it comes before contacts.
         urgency(Some(70), 70, 1.0, false),
         urgency(None, 100, 1.0, true),
         urgency(Some(98), 98, 4.0, false),
@@ -93,13 +93,13 @@ fn what_comes_nearer_is_more_urgent_but_never_by_more_than_the_stated_factor() {
     assert!(weights[4] > 4.99 && weights[7] <= 8.0, "{weights:?}");
 }
 
-/// Pairs of meshes that wait, from the left to the right; in two of three the one is held in a hollow of the other.
+/// Pairs of meshes that wait, from left to right; in two of three, one body is inside a hollow of the other.
 const PAIRS: u32 = 24;
-/// Between two of them, metres.
+/// Distance between two pairs, metres.
 const APART_M: f64 = 8.0;
-/// Priority of every second one; that of the others is 1.
+/// Priority of every second pair; that of the others is 1.
 const PRIORITY: f64 = 2.0;
-/// Weight of what is in view: all but the last five.
+/// Weight of the pairs in view: all but the last five.
 const VIEW_WEIGHT: f64 = 2.0;
 /// A ball of 528 triangles as text.
 fn ball_text() -> String {
@@ -112,25 +112,25 @@ fn trimesh(vertices: impl Iterator<Item = Vec3>, faces: &[[u32; 3]]) -> String {
     format!("{{ type = \"trimesh\", vertices = {vertices:?}, faces = {faces:?} }}")
 }
 
-/// A large ball with a hollow that a ball of radius 1 m has a few centimetres of room in.
+/// A large ball with a hollow that holds a ball of radius 1 m with a few centimetres of room.
 fn shell() -> String {
     let mesh = ball(12, 0.0);
     let at = |radius_m: f64| mesh.vertices().iter().map(move |v| v.coords * radius_m);
     let first = u32::try_from(mesh.vertices().len()).unwrap();
-    // Those of the hollow look inward.
+    // The faces of the hollow point inward.
     let inward = |[a, b, c]: [u32; 3]| [a, c, b].map(|at| at + first);
     let inward = mesh.faces().iter().copied().map(inward);
     let faces: Vec<[u32; 3]> = mesh.faces().iter().copied().chain(inward).collect();
     trimesh(at(2.0).chain(at(1.05)), &faces)
 }
 
-/// Whether the second of a pair is in the hollow of the first: no plane parts these, and no turn of a small budget says
-/// that they are apart. The others stand side by side.
+/// Whether the second of a pair is in the hollow of the first: no plane separates these, and no turn of a small budget
+/// proves them apart. The others are next to each other.
 fn is_held(pair: u32) -> bool {
     !pair.is_multiple_of(3)
 }
 
-/// All pairs, and who looks at most of them from aside.
+/// All pairs, and a viewpoint that sees most of them from the side.
 fn scene() -> String {
     let (ball, shell) = (ball_text(), shell());
     let mut text = format!(
@@ -149,8 +149,8 @@ fn scene() -> String {
     text
 }
 
-/// The next poses: the second of each pair is put elsewhere beside the first or in its hollow, turned by any angle, so
-/// that nothing is left of what was proved.
+/// The next poses: the second of each pair is moved to another place next to the first or in its hollow, with a random
+/// rotation, so that no earlier proof survives.
 fn poses(random: &mut Random) -> Vec<TransformRow> {
     let mut rows = Vec::new();
     for pair in 0..PAIRS {
@@ -162,7 +162,7 @@ fn poses(random: &mut Random) -> Vec<TransformRow> {
         let [dx, dy, dz] = if is_held(pair) {
             [0.0; 3].map(|_: f64| random.range(-0.01, 0.01))
         } else {
-            // Off all axes: the boxes overlap while the balls are apart.
+            // Away from all axes: the boxes overlap while the balls are apart.
             let (distance_m, turn) = (random.range(2.06, 2.2), random.range(0.0, TAU));
             let flat_m = distance_m * (2.0_f64 / 3.0).sqrt();
             let (y, x) = turn.sin_cos();
@@ -186,7 +186,7 @@ fn turns_of(engine: &Engine, pair: u32) -> (u32, bool) {
     (turns, verdict == Verdict::Possible)
 }
 
-/// Ticks that a pair waits for a turn at most, as `order` states it.
+/// Most ticks that a pair waits for a turn, as `order` states it.
 ///
 /// * `pairs` - that wait at the same time; `turns` - a tick; `ratio` - of the greatest weight to the least.
 fn longest_wait(pairs: u32, turns: u32, ratio: f64) -> f64 {
@@ -203,7 +203,7 @@ fn law_4_7_no_pair_of_meshes_waits_longer_for_a_turn_than_is_stated() {
     let mut rig = Rig::new(&scene, &shapes, Arc::new(ManualClock::new(1_000_000_000))).unwrap();
     let mut random = Random::new(43);
     rig.tick(&[poses(&mut random)], Budget::UNLIMITED);
-    // So few units are one turn a tick.
+    // So few units give one turn a tick.
     let most = longest_wait(PAIRS, 1, PRIORITY * CLOSING_WEIGHT * VIEW_WEIGHT);
     assert!(f64::from(TICKS) > most, "who starves is to be seen");
     let mut before: Vec<u32> = (0..PAIRS)
@@ -238,8 +238,8 @@ fn law_4_7_no_pair_of_meshes_waits_longer_for_a_turn_than_is_stated() {
         open as usize > TICKS as usize * held / 2,
         "the budget is to be too small for them: {open}"
     );
-    // Those before it by their weight took more than one round.
+    // The pairs before it by weight took more than one round.
     assert!(longest > PAIRS, "{longest} ticks");
-    // In the middle of the view and of high priority, against neither.
+    // Pair 7 is in the middle of the view and of high priority; pair 20 is neither.
     assert!(had[7] > 2 * had[20], "{had:?}");
 }

@@ -1,12 +1,12 @@
-//! How far two bodies surely go on without touching: conservative advancement, from one share of the motion.
+//! How far two bodies surely move on without touching: conservative advancement, from one share of the motion.
 //!
-//! In: a moment of the motion. Out: a time for which they stay apart, or that they touch. Every shape pair says its own
-//! time, and the least holds. Three bounds, the first that is good enough:
-//! - balls about the shapes, along the line between them;
-//! - convex pairs: the slab between them along the normal of the exact query. Its width goes down no faster than the
-//!   support points in a slightly turned direction say (see [`Slab::free_for`]), so the advance ends at the touch after
-//!   a few queries, also where bodies turn;
-//! - meshes: a lower bound of the gap from the trees, over the greatest speed of any point.
+//! In: a moment of the motion. Out: a time for which they stay apart, or that they touch. Each shape pair has its own
+//! time, and the least counts. Three bounds, of which the first good enough is used:
+//! - balls around the shapes, along the line between them;
+//! - convex pairs: the slab between them along the normal of the exact query. Its width shrinks no faster than the
+//!   support points in a slightly turned direction allow (see [`Slab::free_for`]), so the advance ends at the touch
+//!   after a few queries, also when bodies rotate;
+//! - meshes: a lower bound of the gap from the trees, divided by the greatest speed of any point.
 //!
 //! Source: Mirtich 1996, "Impulse-based dynamic simulation of rigid body systems", section 2.3 (conservative
 //! advancement); the slab is the directional bound of Zhang, Lee and Kim 2006 (FAST), with one term more.
@@ -24,20 +24,19 @@ use crate::world::{Body, PlacedShape};
 
 use super::motion::{Moment, Span, arm, balls, reach_of, time_of};
 
-/// Balls are good enough while they are apart by this share of the smaller one's radius: then a query would gain
-/// little.
+/// Balls are good enough while they are apart by this share of the smaller radius: beyond it a query would gain little.
 const BALLS_ENOUGH: f64 = 0.5;
 /// A mesh pair's bound is good enough at this share of the distance: more work would advance little farther.
 const BOUND_ENOUGH: f64 = 0.75;
-/// Units between two looks at a mesh pair's bound.
+/// Units between two checks of a mesh pair's bound.
 const MESH_UNITS: u64 = 16;
 
 /// What is known of two bodies from a moment on.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Ahead {
-    /// They do not touch for so long (in shares of the motion); where they are nearest they are apart by `gap_m`.
+    /// They do not touch for `time` (in shares of the motion); at their nearest they are apart by `gap_m` now.
     Free { time: f64, gap_m: f64 },
-    /// They touch here: whatever rounding did to the way, or at poses that were sent.
+    /// They touch here: whatever rounding did to the way, or at poses that were received.
     Touch,
     /// Rounding leaves open whether they touch here.
     Unsure,
@@ -45,8 +44,8 @@ pub(super) enum Ahead {
     Cut,
 }
 
-/// What queries need beside the bodies; kept over pairs and ticks. Fronts of their own: in the store of those that are
-/// carried, what comes and goes in a look would find another room in each tick.
+/// Working memory of queries, kept over pairs and ticks. It has its own fronts: in the store of carried fronts, the
+/// short-lived ones would find different room in each tick.
 #[derive(Debug, Default)]
 pub(super) struct Tools {
     fronts: FrontStore,
@@ -62,7 +61,7 @@ impl Tools {
     }
 }
 
-/// Where work is done.
+/// A query's tools, counters and meter.
 pub(super) struct Work<'w, 'm> {
     pub(super) tools: &'w mut Tools,
     pub(super) counters: &'w mut Counters,
@@ -72,7 +71,7 @@ pub(super) struct Work<'w, 'm> {
 impl Work<'_, '_> {
     /// Looks ahead from a moment.
     ///
-    /// * `wanted` - a time that is enough: what is farther is not looked into.
+    /// * `wanted` - a time that is enough: a longer one is not searched for.
     pub(super) fn look(
         &mut self,
         (a, b): (&Body, &Body),
@@ -81,7 +80,7 @@ impl Work<'_, '_> {
         warm: &mut Warm,
     ) -> Ahead {
         let (mut least, mut nearest_m, mut unsure) = (wanted, f64::INFINITY, false);
-        // What is in two boxes comes nearer no faster than any point of the two bodies.
+        // Two boxes approach no faster than any points of the two bodies.
         let speed = moment.speed(reach_of(a), reach_of(b));
         let mut waiting = std::mem::take(&mut self.tools.waiting);
         let mut walk = PairWalk::new((a, b), &moment.rel, &mut waiting);
@@ -127,7 +126,7 @@ impl Work<'_, '_> {
         }
     }
 
-    /// As [`Work::look`], of two shapes.
+    /// As [`Work::look`], for two shapes.
     fn shapes(
         &mut self,
         (one, other): (&PlacedShape, &PlacedShape),
@@ -170,7 +169,7 @@ impl Work<'_, '_> {
         touch(gap.max <= 0.0, here, closest.finished, moment)
     }
 
-    /// As [`Work::shapes`], where one of the two is a mesh.
+    /// As [`Work::shapes`], if one of the two is a mesh.
     fn mesh_pair(
         &mut self,
         (one, other): (&PlacedShape, &PlacedShape),
@@ -208,17 +207,17 @@ impl Work<'_, '_> {
         }
     }
 
-    /// Gives memory back.
+    /// Releases memory.
     pub(super) fn release(&mut self) {
         let Tools { fronts, meshes, .. } = &mut *self.tools;
         meshes.release(fronts);
     }
 }
 
-/// What is told of two shapes that the way may bring to touch here.
+/// Result for two shapes that may touch here on the way.
 ///
-/// * `sure` - they do whatever rounding did to the way.
-/// * `here` - their gap at the poses as they are.
+/// * `sure` - they touch whatever rounding did to the way.
+/// * `here` - their gap at the poses without rounding allowance.
 fn touch(sure: bool, here: Interval, finished: bool, moment: &Moment) -> Ahead {
     let touching = here.max <= 0.0 || (finished && here.min <= 0.0);
     if sure || (moment.told && touching) {
@@ -232,14 +231,13 @@ fn widened(gap: Interval, slop: f64) -> Interval {
     if slop == 0.0 { gap } else { gap.widened(slop) }
 }
 
-/// The slab between two convex shapes that are apart: along a fixed direction, everything of A lies below it,
-/// everything of B above.
+/// The slab between two convex shapes that are apart: along a fixed direction, all of A lies below it, all of B above.
 struct Slab<'a> {
     shapes: (&'a PlacedShape, &'a PlacedShape),
     moment: &'a Moment,
     /// Unit, scene frame, from A to B.
     normal: Vec3,
-    /// Its width is no less, metres.
+    /// A lower bound on its width, metres.
     width_m: f64,
     /// Greatest distances of the two from their pivots, metres.
     reach: (f64, f64),
@@ -260,7 +258,7 @@ impl<'a> Slab<'a> {
             width_m: gap_m,
             reach,
         };
-        // Asked of the shapes themselves where they have an extent: the normal has been turned into the scene's frame.
+        // Measured on the shapes themselves if they are bounded: the normal was rotated into the scene's frame.
         if reach.0.is_finite() && reach.1.is_finite() {
             let between = (moment.b.at - moment.a.at).dot(&normal);
             let width = between - slab.extent_b(&normal) - slab.extent_a(&normal);
@@ -288,10 +286,10 @@ impl<'a> Slab<'a> {
 
     /// For how long the slab surely stays open.
     ///
-    /// Of a point `a` of A and `b` of B, the width `n . (b - a)` is `f + t f' ` but for `t^2 / 2` times the greatest
-    /// centripetal acceleration; and `f + t f'` is a dot product with `n + t n x w`: so the least of all pairs of
-    /// points is again a matter of support points, in a direction turned a little. It is concave in `t`, hence above
-    /// the lesser of its values at both ends.
+    /// For a point `a` of A and `b` of B, the width `n . (b - a)` is `f + t f'` up to an error of `t^2 / 2` times the
+    /// greatest centripetal acceleration; and `f + t f'` is a dot product with `n + t n x w`: so the least over all
+    /// pairs of points again follows from support points, in a slightly turned direction. It is concave in `t`, hence
+    /// no less than the smaller of its values at both ends.
     ///
     /// * `best_m` - the distance, for a first guess.
     fn free_for(&self, best_m: f64) -> f64 {
@@ -315,7 +313,7 @@ impl<'a> Slab<'a> {
         }
         let bend = (a.rate * a.swing(self.reach.0) + b.rate * b.swing(self.reach.1)) / 2.0
             * (1.0 + 16.0 * ROUND);
-        // The closing speed where they are nearest: the first guess of when the slab is used up.
+        // The closing speed at the nearest points: the first guess of when the slab closes.
         let near = closing + self.closing_of_extremes(&across_a, &across_b);
         let mut time = root(best_m.min(self.width_m).max(0.0), near, bend).min(left);
         for _ in 0..4 {
@@ -330,7 +328,7 @@ impl<'a> Slab<'a> {
         plain
     }
 
-    /// Closing speed that the turns add where the slab is touched.
+    /// Closing speed that the rotations add at the points that touch the slab.
     fn closing_of_extremes(&self, across_a: &Vec3, across_b: &Vec3) -> f64 {
         let at = |placed: &PlacedShape, span: &Span, m: &Vec3| {
             point(placed, span, m).unwrap_or_default()
@@ -364,7 +362,7 @@ impl<'a> Slab<'a> {
 /// Least positive root of `gap - closing t - bend t^2`; `bend` is positive.
 fn root(gap: f64, closing: f64, bend: f64) -> f64 {
     let disc = (closing * closing + 4.0 * bend * gap).max(0.0).sqrt();
-    // The form that does not cancel.
+    // The form without cancellation.
     if closing > 0.0 {
         2.0 * gap / (closing + disc)
     } else {
@@ -372,7 +370,7 @@ fn root(gap: f64, closing: f64, bend: f64) -> f64 {
     }
 }
 
-/// The point of a shape farthest along `m`, from the pivot, scene frame; `None` for what has no such point.
+/// The point of a shape farthest along `m`, from the pivot, scene frame; `None` for a shape without such a point.
 fn point(placed: &PlacedShape, span: &Span, m: &Vec3) -> Option<Vec3> {
     let Geometry::Convex(convex) = &placed.shape.geometry else {
         return None;

@@ -1,4 +1,4 @@
-//! The first touch of two bodies on demand: a sweep beside the pair set, of which nothing is remembered.
+//! The first touch of two bodies on demand: a sweep outside the pair set, of which nothing is stored.
 
 use crate::ids::{BodySlot, PairSlot};
 use crate::narrow::Counters;
@@ -11,7 +11,7 @@ use super::{Passage, Sweep};
 
 /// When two bodies touch first on their ways.
 ///
-/// * `meter` - where it closes, what is known by then is the answer.
+/// * `meter` - if it closes, the answer is what is known by then.
 #[must_use]
 pub fn touch_on_way(a: &Body, b: &Body, meter: &mut Meter<'_>) -> Passage {
     let (mut tools, mut counters) = (Tools::default(), Counters::default());

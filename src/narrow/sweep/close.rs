@@ -1,7 +1,7 @@
-//! The end of a sweep: a pose at which the two surely touch, near behind the share that they reach without.
+//! The end of a sweep: a pose at which the two surely touch, just behind the share that they reach without a touch.
 //!
-//! In: a sweep that creeps, or that rounding has brought to a stop. Out: a share at which they touch, or none up to the
-//! end of the way.
+//! In: a sweep that advances very slowly, or that rounding has stopped. Out: a share at which they touch, or none up to
+//! the end of the way.
 
 use crate::world::Body;
 
@@ -9,19 +9,19 @@ use super::Sweep;
 use super::advance::{Ahead, Work};
 use super::motion::Moment;
 
-/// A touch is bracketed by shares as near as this: a thousandth of what is promised.
+/// A touch is bracketed by shares this close together: a thousandth of what is promised.
 const CLOSE_ENOUGH: f64 = 1e-9;
-/// Where rounding hides the touch, the share where it is plain is sought to this part of how far it is ahead.
+/// If rounding hides the touch, the share where it is certain is searched to within this part of its distance ahead.
 const PLAIN_ENOUGH: f64 = 0.1;
-/// A sweep that has not come nearer than this in so many looks is asked for a touch ahead of it.
+/// A sweep is probed for a touch ahead of it each time it has taken this many looks.
 const PATIENCE_LOOKS: u32 = 8;
-/// So many shares before a known touch without one tell that it may not be the first.
+/// After this many probes without a touch before a known one, the known one may not be the first.
 const PROBES_IN_VAIN: u32 = 4;
-/// An advance by less has all but met the touch.
+/// An advance by less than this has almost reached the touch.
 const CREEP: f64 = 1e-10;
 
 impl Sweep {
-    /// Looks for a pose behind the share reached at which they surely touch, or one nearer than the one known.
+    /// Looks for a pose behind the share reached at which they surely touch, or for one nearer than the known one.
     pub(super) fn close_in(&mut self, bodies: (&Body, &Body), step: f64, work: &mut Work<'_, '_>) {
         let (known, left) = (self.hit.is_finite(), self.hit - self.free);
         let plain = self.stuck && self.hit - self.missed <= PLAIN_ENOUGH * left;
@@ -51,14 +51,14 @@ impl Sweep {
         }
         match work.look(bodies, &moment, 0.0, &mut warm) {
             Ahead::Touch => (self.hit, self.probes) = (at, 0),
-            // Asked again when there is more to spend.
+            // Tested again when there is more budget.
             Ahead::Cut => {}
             Ahead::Free { .. } | Ahead::Unsure => self.missed = at,
         }
     }
 
-    /// How much of the way to the touch that is known to look for one before it in. Two bodies may meet several times:
-    /// where shares between had none again and again, the first touch lies rather before them.
+    /// The part of the way to the known touch in which to look for an earlier one. Two bodies may meet several times:
+    /// if probes in between found no touch again and again, the first touch more likely lies before them.
     fn span(&self, step: f64) -> f64 {
         let before = self.missed - self.free;
         if self.probes >= PROBES_IN_VAIN && self.missed < self.hit && 0.3 * before > step {
@@ -68,12 +68,12 @@ impl Sweep {
         }
     }
 
-    /// How far behind the share reached to look for a touch, where none is known: each look that finds nothing goes
-    /// farther, to the end of the way where it will not do without.
+    /// How far behind the share reached to look for a touch if none is known: each look that finds nothing goes
+    /// farther, to the end of the way if necessary.
     fn behind(&self, step: f64) -> f64 {
         let gap_m = self.last.1.max(0.0);
         let ahead = if self.stuck {
-            // So near that rounding hides it: what the slope says would be rounding, too.
+            // So near that rounding hides it: the slope would be rounding, too.
             0.0
         } else if self.slope > 0.0 {
             gap_m / self.slope

@@ -1,21 +1,20 @@
-//! Whether two ways are in step: whether it is known where the one body was while the other went.
+//! Whether two ways are in step: whether it is known where one body was while the other moved.
 //!
-//! In: two paths. Out: yes or no, and what holds of two that are not in step whatever the order was.
+//! In: two paths. Out: yes or no, and what holds in any order for two that are not in step.
 //!
-//! A frame has the poses of one moment: two bodies are in step from one frame that has both to the next such. Where
-//! only one of them goes between two of those, any order comes to the same. Else the frame that has the one says
-//! nothing of the other on its way: it may have stood until then, or not. Two sources have no frame in common but the
-//! poses of the two ticks: where each sent one frame, the two ways between those poses are in step, as if they were of
-//! one (law: the time of impact is that of the last two poses); of several in a tick nobody says which goes with which.
+//! A frame has the poses of one moment: two bodies are in step from one frame that has both to the next such frame. If
+//! only one of them moves in between, any order gives the same result. Otherwise a frame with only one of them says
+//! nothing of the other: it may have stood still until then, or not. Two sources share no frame except the poses of the
+//! two ticks. If each sent one frame, the two ways between those poses are in step, as if from one source (law: the
+//! time of impact is that of the last two poses); with several, it is unknown which belong together.
 //!
-//! Refused: an order by when frames were sent, for simulators that go through the same step take different time over
-//! it.
+//! Refused: an order by send time, since simulators that compute the same step take different time for it.
 
 use crate::world::{Body, Leg, Path};
 
 use super::motion::{length_apart, way};
 
-/// Whether the two are in step all the way.
+/// Whether the two are in step on the whole way.
 pub(super) fn are_in_step((a, b): (&Body, &Body)) -> bool {
     let (Some(one), Some(other)) = (way(a), way(b)) else {
         return true;
@@ -45,9 +44,9 @@ pub(super) fn are_in_step((a, b): (&Body, &Body)) -> bool {
     }
 }
 
-/// Whether two that are not in step stay apart whatever the order was.
+/// Whether two that are not in step stay apart in any order of their motions.
 ///
-/// * `apart_m` - by how much they surely were apart at the begin.
+/// * `apart_m` - by how much they surely were apart at the start.
 pub(super) fn apart_in_any_order((a, b): (&Body, &Body), apart_m: f64) -> bool {
     let (Some(one), Some(other)) = (way(a), way(b)) else {
         return false;
@@ -55,23 +54,23 @@ pub(super) fn apart_in_any_order((a, b): (&Body, &Body), apart_m: f64) -> bool {
     !one.hull().overlaps(other.hull()) || apart_m > 0.0 && apart_m > length_apart((a, b))
 }
 
-/// What happens between two frames that have both bodies.
+/// The motion between two frames that have both bodies.
 #[derive(Clone, Copy, Debug, Default)]
 struct Between {
     one_goes: bool,
     other_goes: bool,
-    /// A frame has one of them alone.
+    /// A frame has only one of them.
     alone: bool,
 }
 
 impl Between {
-    /// Whether the order is open, and matters.
+    /// Whether the order is unknown, and matters.
     fn is_open(self) -> bool {
         self.alone && self.one_goes && self.other_goes
     }
 }
 
-/// Takes the next leg, where it ends at this frame; whether it does.
+/// Takes the next leg if it ends at this frame. Returns whether it does.
 fn take(legs: &mut &[Leg], frame: u32, goes: &mut bool) -> bool {
     match legs.split_first() {
         Some((leg, rest)) if leg.frame == frame => {

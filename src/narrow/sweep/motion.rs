@@ -1,16 +1,16 @@
-//! Two bodies on their way: where they are at a share of it, and how fast they go there.
+//! Two moving bodies: where they are at a share of the motion, and how fast they move there.
 //!
 //! In: bodies with their paths. Out: poses, velocities and the rounding to allow for. A body that is not continuous is
-//! where this tick has it, all the way; of one that jumps nothing is asked meanwhile.
+//! at this tick's pose all the way; during a jump nothing is tested.
 
 use crate::math::{Point, Pose, ROUND, Vec3, relative};
 use crate::shape::{Core, Geometry};
 use crate::world::{Body, Leg, Path, PlacedShape};
 
-/// Shapes of which it is asked whether all spin about one axis: a wheel has few, and this is asked at each look.
+/// Most shapes of a body that is checked at each look for rotation about one common axis: a wheel has few.
 const PARTS_MAX: usize = 8;
 
-/// A body's motion for a while, per unit of the share: the pivot goes straight, the body turns about a fixed axis.
+/// A body's motion for a while, per unit of the share: the pivot moves straight, the body rotates about a fixed axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Span {
     /// Share at which it ends.
@@ -22,20 +22,20 @@ pub(super) struct Span {
     pub(super) at: Point,
     /// Velocity of the pivot, scene frame.
     pub(super) velocity: Vec3,
-    /// Angular velocity, scene frame; of a turn in two parts only [`Span::rate`] is meant.
+    /// Angular velocity, scene frame; if `mixed`, only [`Span::rate`] is valid.
     pub(super) spin: Vec3,
     /// Greatest angular speed.
     pub(super) rate: f64,
-    /// It turns in two parts at once, so `spin` is no axis.
+    /// It rotates about two axes at once, so `spin` is no axis.
     pub(super) mixed: bool,
     pub(super) jump: bool,
     /// How far rounding may put a point of the body off the way, metres.
     pub(super) slop: f64,
-    /// The pose is one that was sent: there it is off by nothing.
+    /// The pose was received, not interpolated: it has no error.
     pub(super) told: bool,
 }
 
-/// The path of a body, where it is to be followed.
+/// The path of a body, if it is to be swept.
 pub(super) fn way(body: &Body) -> Option<&Path> {
     body.path.as_deref().filter(|path| path.is_swept())
 }
@@ -52,8 +52,8 @@ impl Span {
         } = place;
         let pose = leg.at(share, path.pivot());
         if !place.goes {
-            // On a pose that was sent, to the last digit. Behind its last one it may be elsewhere by as much as any
-            // that stands; and before it came again it was nowhere.
+            // On a received pose, exactly. Behind its last pose it may be elsewhere by as much as any body at rest;
+            // before it reappeared it was nowhere.
             let behind = share >= 1.0;
             let astray_m = if behind { body.reach_m } else { 0.0 };
             return Self {
@@ -81,7 +81,7 @@ impl Span {
             rate: leg.angle() * per_share * (1.0 + 8.0 * ROUND),
             mixed: leg.extra != Vec3::zeros(),
             jump: leg.jump,
-            // Two sums of coordinates that far out; all else is of the size of the body and its way.
+            // Two sums of coordinates that far out; everything else is of the size of the body and its way.
             slop: 16.0 * ROUND * far + 64.0 * ROUND * (size + per_share * leg.travel.amax()),
             told: path.is_told_at(share),
         };
@@ -92,8 +92,8 @@ impl Span {
         span
     }
 
-    /// How far its surface is, in all of a leg's turn, from where it would be without it, where that is no more than
-    /// what is rounded anyway; `None`: it does not turn, or not about its own axis, or is no solid of revolution.
+    /// How far its surface gets, in all of a leg's rotation, from where it would be without it, if that is no more than
+    /// the rounding; `None`: it does not rotate, or not about its own axis, or is no solid of revolution.
     fn astray(&self, body: &Body, angle: f64, reach_m: f64) -> Option<f64> {
         let about = self.spin.try_normalize(0.0).filter(|_| !self.mixed)?;
         if body.shapes.len() > PARTS_MAX {
@@ -139,7 +139,7 @@ impl Span {
         }
     }
 
-    /// `rate` times a distance from the pivot, also where the distance has no bound and the body does not turn.
+    /// `rate` times a distance from the pivot, also if the distance is unbounded and the body does not rotate.
     pub(super) fn swing(&self, reach: f64) -> f64 {
         if self.rate == 0.0 {
             0.0
@@ -149,15 +149,15 @@ impl Span {
     }
 }
 
-/// Where on its way a body is for a while.
+/// Where a body is on its way for a while.
 #[derive(Clone, Copy, Debug)]
 struct Place<'a> {
     leg: &'a Leg,
     /// How much of the leg is done.
     share: f64,
-    /// Share of the motion at which it ends, or begins where the body stands before it.
+    /// Share of the motion at which the leg ends, or begins if the body waits before it.
     until: f64,
-    /// Whether it goes along the leg; else it stands at an end of it.
+    /// Whether it moves along the leg; otherwise it stands at one end of it.
     goes: bool,
 }
 
@@ -171,7 +171,7 @@ fn place_at(path: &Path, s: f64) -> Option<Place<'_>> {
             leg,
             share: 1.0,
             until: 1.0,
-            // Also where the motion is over: there it has the speed that it came with.
+            // Also when the motion is over: there it has its arrival speed.
             goes: leg.frame >= path.frames(),
         });
     };
@@ -202,17 +202,16 @@ pub(super) struct Moment {
     pub(super) share: f64,
     /// Share at which either changes its motion.
     pub(super) until: f64,
-    /// Rounding and reach of both: the gap may differ by as much, metres.
+    /// Rounding and reach of both: the gap may be off by this much, metres.
     pub(super) slop: f64,
-    /// Their places are beyond doubt, and off by no rounding of the way: a touch here is one as any verdict tells it
-    /// (law 3.4).
+    /// Their places are certain and exact: a touch here counts as it would for any verdict (law 3.4).
     pub(super) told: bool,
 }
 
 impl Moment {
     pub(super) fn of((a, b): (&Body, &Body), s: f64) -> Self {
         let (of_a, of_b) = (Span::at(a, s), Span::at(b, s));
-        // Who goes a way between admitted poses is on it, or where it stands on it; who has none may be elsewhere.
+        // A body on a way between admitted poses is on that way, or at rest on it; one without a way may be elsewhere.
         let reach = |body: &Body| {
             if way(body).is_some() {
                 0.0
@@ -241,14 +240,14 @@ impl Moment {
         self.b.velocity - self.a.velocity
     }
 
-    /// Greatest speed of any point of the one seen from any point of the other, per unit of the share.
+    /// Greatest speed of any point of one relative to any point of the other, per unit of the share.
     pub(super) fn speed(&self, reach_a: f64, reach_b: f64) -> f64 {
         let speed = self.closing_velocity().norm() + self.a.swing(reach_a) + self.b.swing(reach_b);
         speed * (1.0 + 16.0 * ROUND)
     }
 }
 
-/// No point of the one goes farther than this seen from the other, all the way, metres.
+/// Over the whole way, no point of one moves farther than this seen from the other, metres.
 pub(super) fn length(bodies: (&Body, &Body)) -> f64 {
     let (mut s, mut sum) = (0.0, 0.0);
     while s < 1.0 {
@@ -260,7 +259,7 @@ pub(super) fn length(bodies: (&Body, &Body)) -> f64 {
     sum * (1.0 + 1e-12)
 }
 
-/// As [`length`], where nobody says how far the one was while the other went.
+/// Like [`length`], for two bodies that are not in step: the sum of both path lengths.
 pub(super) fn length_apart((a, b): (&Body, &Body)) -> f64 {
     let of = |body: &Body| {
         let legs = way(body).map_or(&[][..], Path::legs);
@@ -273,31 +272,31 @@ pub(super) fn length_apart((a, b): (&Body, &Body)) -> f64 {
     (of(a) + of(b)) * (1.0 + 1e-12)
 }
 
-/// How far a body's surface is from its pivot.
+/// Greatest distance of a body's surface from its pivot.
 pub(super) fn reach_of(body: &Body) -> f64 {
     way(body).map_or(body.radius, Path::reach)
 }
 
-/// Distance of a shape's centre from the pivot, and of its farthest point.
+/// Distance of a shape's centre from the pivot, and of its farthest point from it.
 pub(super) fn arm(placed: &PlacedShape, span: &Span) -> (f64, f64) {
     let arm = (placed.pose * placed.shape.centre - span.pivot).norm();
     let arm = arm * (1.0 + 8.0 * ROUND) + 8.0 * ROUND * span.pivot.coords.amax();
     (arm, arm + placed.shape.radius)
 }
 
-/// For how long two balls stay apart: along the line between their centres now.
+/// For how long two balls stay apart, along the line between their present centres.
 pub(super) fn balls(one: &PlacedShape, other: &PlacedShape, moment: &Moment, bound_m: f64) -> f64 {
     let (from, to) = (
         moment.a.pose * (one.pose * one.shape.centre),
         moment.b.pose * (other.pose * other.shape.centre),
     );
     let direction = (to - from).try_normalize(0.0).unwrap_or_else(Vec3::z);
-    // The farther apart, the better is the line known; what rounding may turn it by costs as much of the speed.
+    // The farther apart, the more accurate the line; its possible rotation by rounding costs as much of the speed.
     let velocity = moment.closing_velocity();
     let turned = moment.a.swing(arm(one, &moment.a).0) + moment.b.swing(arm(other, &moment.b).0);
     let off = 16.0 * ROUND * (velocity.amax() + turned);
     let closing = -velocity.dot(&direction) + turned + off;
-    // A slab between two balls along one direction: as wide as they are apart.
+    // A slab between two balls along one direction, as wide as the distance between them.
     let far = |placed: &PlacedShape, pose: &Pose| pose.translation.vector.amax() + placed.reach_m();
     let slack = 64.0 * ROUND * (far(one, &moment.a.pose) + far(other, &moment.b.pose));
     time_of(bound_m - slack, closing)

@@ -1,11 +1,11 @@
-//! Whose turn it is: in which order a tick's sweeps are looked at.
+//! In which order a tick's sweeps have their turns.
 //!
 //! In: the sweeps of a tick, a [`Meter`]. Out: sweeps that are done, and where the next tick begins.
 //!
-//! Rounds of short turns, so that what is decided soon does not wait for what takes long. Nothing starves where a
-//! budget does not reach round: a tick begins behind the last pair that had a turn in the one before. And where no turn
-//! is long enough to decide anything, the first pair of a tick is looked at to its end before the rounds begin, in the
-//! next tick the pair behind it: so each pair that stays has all looks that a budget allows for, at latest after as
+//! Rounds of short turns, so that quick decisions do not wait for slow ones. Nothing starves if a budget does not
+//! suffice for a round: a tick begins behind the last pair that had a turn in the tick before. And in case no turn is
+//! long enough to decide anything, the first pair of a tick is worked on to its end before the rounds begin, in the
+//! next tick the pair behind it: so each pair that stays gets all looks that a budget allows, at the latest after as
 //! many ticks as there are such pairs.
 
 use crate::ids::{BodyId, PairSlot};
@@ -22,20 +22,20 @@ use super::{Sweep, Sweeps};
 struct Turn {
     slot: PairSlot,
     ids: Ids,
-    /// Where it stood in the list.
+    /// Its index in the list.
     at: usize,
 }
 
 type Ids = (Option<BodyId>, Option<BodyId>);
 
-/// Where rounds go on, kept over ticks.
+/// Where rounds continue, kept over ticks.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Turns {
-    /// Who was looked at to the end first.
+    /// The pair that was last worked on to its end first.
     first: Option<Turn>,
-    /// Whether somebody was in this tick.
+    /// Whether there was one in this tick.
     has_first: bool,
-    /// Who had the last turn of a round.
+    /// The pair that had the last turn of a round.
     last: Option<Turn>,
 }
 
@@ -47,8 +47,8 @@ impl Turns {
 }
 
 impl Narrow {
-    /// Works on sweeps while the meter is open, for at most this share of it and so many looks at each; whether no more
-    /// is to be done.
+    /// Works on sweeps while the meter is open, for at most this share of it and this many looks at each. Returns
+    /// whether nothing is left to do.
     pub(in crate::narrow) fn spend_on_sweeps(
         &mut self,
         world: &World,
@@ -71,7 +71,7 @@ impl Narrow {
             memos,
             ..
         } = self;
-        // In a tick it is one and the same that comes first.
+        // Within a tick the same pair stays first.
         let start = match sweeps.turns.first {
             Some(first) if sweeps.turns.has_first => sweeps.places[first.slot.index()] as usize,
             first => sweeps.behind(first, by_ids, world),
@@ -85,7 +85,7 @@ impl Narrow {
             counters,
             meter,
         };
-        // A turn; whether there was time for it.
+        // A turn. Returns whether there was time for it.
         let mut give = |sweep: &mut Sweep| {
             let within = share.is_none_or(|share| work.meter.within(share));
             if !within || !work.meter.open() {
@@ -93,7 +93,7 @@ impl Narrow {
             }
             if let (Some(a), Some(b)) = (world.body(sweep.a), world.body(sweep.b)) {
                 sweep.turn((a, b), &mut work);
-                // Where they are next asked for their gap.
+                // The next query for their gap starts from here.
                 memos[sweep.slot.index()].warm = sweep.warm;
             }
             true
@@ -134,7 +134,7 @@ impl Narrow {
 }
 
 impl Sweeps {
-    /// By body ids, so that a budget of units is spent alike whatever the slots are.
+    /// Sorts by body ids, so that a budget of units is spent the same way regardless of the slots.
     fn sort(&mut self, world: &World) {
         let Self { list, places, .. } = self;
         list.sort_unstable_by_key(|sweep| ids_of(sweep, world));
@@ -143,9 +143,9 @@ impl Sweeps {
         }
     }
 
-    /// The place behind the one that had a turn, whether or not it is still there; of a list that is not empty.
+    /// The index behind the pair that had a turn, whether or not that pair still exists; for a list that is not empty.
     ///
-    /// * `by_ids` - whether the list is sorted so.
+    /// * `by_ids` - whether the list is sorted by ids.
     fn behind(&self, turn: Option<Turn>, by_ids: bool, world: &World) -> usize {
         let Some(turn) = turn else {
             return 0;

@@ -1,6 +1,6 @@
-//! Goal: what is broken in the narrow phase's memory is found. Method: bodies of all kinds that stand in one another
-//! are worked on with too small a budget, so that something is under way everywhere; then one thing after the other
-//! is broken in a memory of its own.
+//! Goal: damage to the narrow phase's memory is found. Method: intersecting bodies of all kinds are worked on with too
+//! small a budget, so that something is in progress everywhere; then one fault at a time is introduced into a fresh
+//! memory.
 
 use std::path::Path;
 
@@ -30,7 +30,7 @@ fn mesh() -> String {
     format!("{{ type = \"trimesh\", vertices = {vertices:?}, faces = {faces:?} }}")
 }
 
-/// Balls and boxes, single and several, meshes and convex, on a floor, each in the next.
+/// Balls and boxes, single and compound, meshes and convex, on a floor, each overlapping the next.
 fn scene() -> String {
     let (mesh, cube) = (mesh(), "{ type = \"box\", half_extents = [0.8, 0.8, 0.8] }");
     let floor = "{ type = \"half_space\", normal = [0.0, 0.0, 1.0] }";
@@ -63,7 +63,7 @@ struct Stage {
 }
 
 impl Stage {
-    /// Every pair of bodies but those that a filter forbids, and a tick with so many units.
+    /// Every pair of bodies except those that a filter forbids, and a tick with `units` units.
     fn new((scene, shapes): &Bodies, units: Option<u64>) -> Self {
         let world = World::new(scene, shapes.clone(), 0).unwrap();
         let mut pairs = PairSet::new(1_000);
@@ -108,7 +108,7 @@ impl Stage {
     }
 }
 
-/// The first memory of which something holds.
+/// The first memory that satisfies a condition.
 fn place(narrow: &Narrow, is_it: impl Fn(&Memo) -> bool) -> usize {
     narrow.memos.iter().position(is_it).unwrap()
 }
@@ -119,7 +119,7 @@ fn what_work_leaves_holds_whenever_it_is_cut_off_and_when_pairs_end() {
     for units in (0..600).step_by(37).map(Some).chain([None]) {
         let mut stage = Stage::new(&bodies, units);
         stage.narrow.validate(&stage.pairs).unwrap();
-        // Every third pair ends, and comes again in the next tick.
+        // Every third pair ends, and begins again in the next tick.
         let gone: Vec<(PairSlot, PairKey)> = stage.pairs.iter().step_by(3).collect();
         let mut delta = PairDelta::default();
         for &(slot, key) in &gone {
@@ -139,10 +139,10 @@ fn what_work_leaves_holds_whenever_it_is_cut_off_and_when_pairs_end() {
     }
 }
 
-/// What is broken, and what is told of it.
+/// A fault to introduce, and the message expected for it.
 type Fault = (&'static str, fn(&mut Narrow));
 
-/// With little work done: much is under way.
+/// With little work done: much is in progress.
 const UNDER_WAY: [Fault; 12] = [
     ("of different lengths", |narrow| {
         narrow.urgencies.pop();
@@ -190,7 +190,7 @@ const UNDER_WAY: [Fault; 12] = [
         narrow.memos[at].compound = 1_000;
     }),
     ("one is lost, or two overlap", |narrow| {
-        // A block that nobody remembers.
+        // A block without an owner.
         let mut run = Run::default();
         let open = Open {
             low: 0.0,
@@ -201,7 +201,7 @@ const UNDER_WAY: [Fault; 12] = [
     }),
 ];
 
-/// Units with which something of each kind is under way.
+/// Units with which something of each kind is in progress.
 fn units_under_way(bodies: &Bodies) -> u64 {
     let is_under_way = |units: &u64| {
         let narrow = Stage::new(bodies, Some(*units)).narrow;
@@ -259,7 +259,7 @@ fn what_is_broken_when_all_is_done_is_found() {
     }
 }
 
-/// Two balls of triangles that are near each other, at rest: the boxes around them overlap.
+/// Two balls of triangles that are near each other, at rest: their bounding boxes overlap.
 #[test]
 fn bug_a_pair_at_rest_that_found_no_room_is_asked_again_in_the_next_tick() {
     let (mesh, more) = (
@@ -275,7 +275,7 @@ fn bug_a_pair_at_rest_that_found_no_room_is_asked_again_in_the_next_tick() {
         let shapes = build_shapes(&scene).unwrap().bodies;
         let mut stage = Stage::new(&(scene, shapes), Some(0));
         let slot = stage.pairs.iter().next().unwrap().0;
-        // No glance that decides it, and no room for a search.
+        // No cheap test decides it, and there is no room for a search.
         stage.narrow.set_search(Search::Restart);
         stage.narrow.shelves.store = FrontStore::with_room(0, 0);
         let none = PairDelta::default();

@@ -1,8 +1,8 @@
 //! `sweepd query --batch`: shape-pair cases in, gaps out, one line of JSON each; no engine, no admission.
 //!
-//! In: JSON Lines with `id`, `a`, `b` (shapes), `pose_a`, `pose_b` (`t` in metres, `q` = w, x, y, z, any finite
-//! length but 0); other keys are passed over. A `trimesh` is a surface (law 3.3), one with `solid: true` a solid.
-//! Out: one answer a line in the order of the input, or `{id, error}`.
+//! In: JSON Lines with `id`, `a`, `b` (shapes), `pose_a`, `pose_b` (`t` in metres, `q` = w, x, y, z, any finite length
+//! but 0); other keys are ignored. A `trimesh` is a surface (law 3.3), one with `solid: true` a solid. Out: one answer
+//! per line in the order of the input, or `{id, error}`.
 
 mod pieces;
 mod solids;
@@ -21,10 +21,10 @@ use crate::shape::ShapeSpec;
 use pieces::{Kind, Pieces, gap};
 use solids::Known;
 
-/// What a case is made of.
+/// The parts of a case.
 const PARTS: [&str; 5] = ["id", "a", "b", "pose_a", "pose_b"];
 
-/// A case as it is written.
+/// A case as written.
 struct Case {
     a: ShapeSpec,
     b: ShapeSpec,
@@ -32,7 +32,7 @@ struct Case {
     pose_b: Placed,
 }
 
-/// A pose as it is written; the quaternion's real part comes first.
+/// A pose as written; the quaternion's real part comes first.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Placed {
@@ -44,7 +44,7 @@ struct Placed {
 #[derive(Serialize)]
 struct Answer {
     id: Value,
-    /// `null` where a mesh surface is crossed; of a solid mesh that overlaps an estimate, or `null`.
+    /// `null` if a mesh surface is crossed; for a solid mesh that overlaps, an estimate or `null`.
     gap_m: Option<f64>,
     gap_min_m: f64,
     gap_max_m: f64,
@@ -56,7 +56,7 @@ struct Answer {
     colliding: bool,
 }
 
-/// What is said of a line that cannot be answered.
+/// The output for a line that cannot be answered.
 #[derive(Serialize)]
 struct Refusal {
     id: Value,
@@ -115,7 +115,7 @@ pub fn run(mut input: impl BufRead, output: &mut dyn Write) -> Result<bool> {
     }
 }
 
-/// One line into `line`: `None` at the end, `Some(false)` when it was too long to keep.
+/// Reads one line into `line`: `None` at the end, `Some(false)` if it was too long to keep.
 fn read_line(input: &mut impl BufRead, line: &mut Vec<u8>) -> std::io::Result<Option<bool>> {
     let limit = REQUEST_BYTES_MAX as u64 + 1;
     if input.by_ref().take(limit).read_until(b'\n', line)? == 0 {
@@ -138,7 +138,7 @@ fn write_line(output: &mut dyn Write, row: &impl Serialize) -> std::io::Result<(
     output.write_all(b"\n")
 }
 
-/// The answer to one line, or its id and what is wrong with it.
+/// The answer to one line, or its id and the error.
 fn answer_line(text: &[u8]) -> std::result::Result<Answer, (Value, String)> {
     let mut value: Value = serde_json::from_slice(text).map_err(|e| (Value::Null, not_json(&e)))?;
     let id = value.get_mut("id").map_or(Value::Null, Value::take);
@@ -173,7 +173,7 @@ fn answer(case: &Case) -> std::result::Result<Answer, String> {
     Ok(shown(&closest, &pose_a, surface))
 }
 
-/// As a daemon would tell it of two bodies.
+/// As a daemon answers for two bodies.
 fn of_solids(known: &Known, pose_a: &Pose) -> Answer {
     let places = (known.normal, known.point_a, known.point_b);
     Answer {
@@ -185,7 +185,7 @@ fn of_solids(known: &Known, pose_a: &Pose) -> Answer {
     }
 }
 
-/// Of pieces.
+/// The answer from pieces.
 fn shown(closest: &Closest, pose_a: &Pose, surface: bool) -> Answer {
     let crossed = surface && closest.gap.max < 0.0;
     let places = (closest.normal, closest.point_a, closest.point_b);
@@ -218,7 +218,7 @@ fn placed((normal, point_a, point_b): (Vec3, Point, Point), pose_a: &Pose) -> An
 }
 
 impl Case {
-    /// Part by part, so that what is wrong is told with where it stands.
+    /// Part by part, so that an error names its part.
     fn read(line: &Value) -> std::result::Result<Self, String> {
         let Value::Object(parts) = line else {
             return Err("it is no object: write {\"id\": .., \"a\": .., \"b\": .., \"pose_a\": .., \"pose_b\": ..}".to_owned());

@@ -1,22 +1,22 @@
 //! Shapes of a batch as convex pieces, and the least gap over all pairs of them.
 //!
-//! In: shape specs, a relative pose. Out: one [`Closest`]. A mesh is a surface here: its triangles are its pieces
-//! (of one that is a solid see `solids`). By
-//! brute force, pruned by bounding balls alone, so that it shares no tree with the engine.
+//! In: shape specs, a relative pose. Out: one [`Closest`]. A mesh is a surface here: its triangles are its pieces (for
+//! a solid mesh see `solids`). By brute force, pruned only by bounding balls, so that it shares no tree with the
+//! engine.
 
 use crate::math::{Interval, Point, Pose, Vec3};
 use crate::narrow::exact::{Closest, Warm, convex_gap, gap_to_half_space, half_space_gap};
 use crate::shape::{Convex, ShapeError, ShapeSpec, spread};
 
-/// What is lost where squares of lengths are too small for a number, metres (the root of the least that has all its
-/// digits): without it points 1e-170 m apart would be told as in one place. No longer gap is changed by so little.
+/// Loss where squares of lengths underflow, metres (the root of the least number that has all its digits): without it
+/// points 1e-170 m apart would be reported as coincident. A longer gap is not changed by so little.
 const SQUARES_LOST_M: f64 = 1.5e-154;
 
-/// Of squares that no number holds.
+/// Message if squares overflow.
 pub(super) const TOO_FAR: &str =
     "the shapes are too far from each other to compute with: write positions that are nearer";
 
-/// What pieces mean together.
+/// What the pieces form together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// One convex solid (or a triangle).
@@ -27,7 +27,7 @@ pub(super) enum Kind {
     HalfSpace,
 }
 
-/// A shape in pieces.
+/// A shape as pieces.
 pub(super) struct Pieces {
     pub(super) kind: Kind,
     convexes: Vec<Convex>,
@@ -46,7 +46,7 @@ impl Pieces {
         })
     }
 
-    /// The pieces of a shape, checked.
+    /// The checked pieces of a shape.
     pub(super) fn build(spec: &ShapeSpec) -> Result<Self, ShapeError> {
         match spec {
             ShapeSpec::Sphere { radius } => Self::convex(Convex::sphere(*radius)),
@@ -107,7 +107,7 @@ impl Pieces {
         if convexes.is_empty() {
             return Err(ShapeError::EmptyMesh);
         }
-        // Their faces name only vertices that are there.
+        // Their faces name only existing vertices.
         let used = faces.iter().flatten().map(|k| &vertices[*k as usize]);
         spread("the extent of the mesh", used)?;
         Ok(Self {
@@ -155,7 +155,7 @@ fn points(vertices: &[[f64; 3]]) -> Vec<Point> {
     vertices.iter().map(|v| Point::from(*v)).collect()
 }
 
-/// The least gap over all pairs of pieces; the interval holds the least of them all.
+/// The least gap over all pairs of pieces; the interval contains the least of them all.
 pub(super) fn gap(a: &Pieces, b: &Pieces, pos12: &Pose) -> Result<Closest, String> {
     let mut least = Least::default();
     match (a.kind, b.kind) {
@@ -181,7 +181,7 @@ pub(super) fn gap(a: &Pieces, b: &Pieces, pos12: &Pose) -> Result<Closest, Strin
         .ok_or_else(|| TOO_FAR.to_owned())
 }
 
-/// Widens an interval by what squares may have lost; one that is no wider than that is as narrow as can be.
+/// Widens an interval by what squares may have lost; if it is no wider than that, it is as narrow as possible.
 fn allow_for_squares(found: &Closest) -> Closest {
     let gap = Interval::new(
         found.gap.min - SQUARES_LOST_M,
@@ -189,19 +189,19 @@ fn allow_for_squares(found: &Closest) -> Closest {
     );
     Closest {
         gap,
-        // Who collides for certain goes on doing so.
+        // A certain collision stays certain.
         finished: found.finished || found.gap.max <= 0.0 || gap.width() <= 4.0 * SQUARES_LOST_M,
         ..*found
     }
 }
 
-/// The answer of the piece pair with the least gap, with the interval over all pairs.
+/// The result of the piece pair with the least gap, with the interval over all pairs.
 #[derive(Default)]
 struct Least {
     found: Option<Closest>,
-    /// Least lower end of those whose search is not finished.
+    /// Least lower end of the unfinished queries.
     open_m: Option<f64>,
-    /// Of a pair of pieces nothing is known: squares of its lengths are beyond what a number holds.
+    /// Nothing is known of one pair of pieces: squares of its lengths overflow.
     is_lost: bool,
 }
 
@@ -228,7 +228,7 @@ impl Least {
         }
     }
 
-    /// What is known of them all, unless one is lost. Finished where no search that is not can narrow it.
+    /// The result over all pairs, unless one is lost. Finished if no unfinished query can narrow it.
     fn found(&self) -> Option<Closest> {
         let found = self.found.filter(|_| !self.is_lost)?;
         let is_open = self.open_m.is_some_and(|low_m| low_m <= found.gap.max);
@@ -243,12 +243,12 @@ impl Least {
     }
 }
 
-/// Two lists of pieces: the pair whose balls are nearest first, for a good upper end, then all that are below it.
+/// Two lists of pieces: the pair whose balls are nearest first, for a good upper end, then all that may be below it.
 fn bounded(a: &[Convex], b: &[Convex], pos12: &Pose, least: &mut Least) {
     let centres: Vec<Point> = b.iter().map(|piece| pos12 * piece.centre()).collect();
     let low = |x: &Convex, y: &Convex, centre: &Point| {
         let distance = (centre - x.centre()).norm();
-        // The roundings of the centre's place and of the sum.
+        // Less the rounding of the centre's position and of the sum.
         distance
             - x.radius()
             - y.radius()

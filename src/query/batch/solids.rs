@@ -1,7 +1,7 @@
-//! Lines of a batch in which a mesh is a solid: answered as a running daemon answers the question for a gap.
+//! Lines of a batch in which a mesh is a solid: answered as a running daemon answers a gap query.
 //!
-//! In: the shapes of a line, the pose of B seen from A. Out: an interval and what is known with it, or `None` where no
-//! mesh of the line is a solid. By the engine's own query, so that the two agree.
+//! In: the shapes of a line, the pose of B seen from A. Out: an interval with its witness, or `None` if no mesh of the
+//! line is a solid. By the engine's own query, so that the two agree.
 
 use std::path::Path;
 
@@ -14,10 +14,10 @@ use crate::time::{Meter, SystemClock};
 use crate::wire::Verdict;
 use crate::world::{Body, Parts, PlacedShape};
 
-/// Farther the squares of distances are no numbers, metres.
+/// Beyond this, squares of distances overflow, metres.
 const FAR_M: f64 = 1e150;
 
-/// What is known of two shapes of which one at least is a solid mesh; A's frame, metres.
+/// The result for two shapes of which at least one is a solid mesh; A's frame, metres.
 pub(super) struct Known {
     pub(super) gap: Interval,
     pub(super) best_m: Option<f64>,
@@ -27,7 +27,7 @@ pub(super) struct Known {
     pub(super) collides: bool,
 }
 
-/// Whether the line says that the inside of a mesh belongs to it.
+/// Whether the line declares a mesh to be a solid.
 fn is_solid(spec: &ShapeSpec) -> bool {
     let ShapeSpec::Trimesh { solid, .. } = spec else {
         return false;
@@ -35,9 +35,9 @@ fn is_solid(spec: &ShapeSpec) -> bool {
     *solid == Some(true)
 }
 
-/// The gap, where one of the two is a solid mesh.
+/// The gap, if one of the two is a solid mesh.
 ///
-/// * `surfaces` - what is known of them as surfaces: a place to tell where the query has none.
+/// * `surfaces` - the result for them as surfaces: gives a place if the query has none.
 ///
 /// # Errors
 /// Why it is no solid, or nothing is known of the surfaces.
@@ -49,7 +49,7 @@ pub(super) fn gap(
     if !is_solid(a) && !is_solid(b) {
         return Ok(None);
     }
-    // The engine is made for scenes, whose numbers are far smaller.
+    // The engine is made for scenes, whose coordinates are far smaller.
     let offset_m = |spec: &ShapeSpec| match spec {
         ShapeSpec::HalfSpace { offset, .. } => offset.abs(),
         _ => 0.0,
@@ -69,7 +69,7 @@ pub(super) fn gap(
     Ok(Some(if let Some(witness) = asked.witness {
         Known {
             gap: asked.gap,
-            // An estimate is never outside what is proved.
+            // An estimate is never outside the proved interval.
             best_m: Some(witness.best_m.max(min).min(max)),
             normal: witness.normal,
             point_a: witness.point_a,
@@ -89,7 +89,7 @@ pub(super) fn gap(
     }))
 }
 
-/// A shape that stands alone; of a mesh of which nothing is said, as a batch takes it: a surface.
+/// A body of one shape; a mesh without a `solid` setting is a surface, as always in a batch.
 fn body(what: &str, spec: &ShapeSpec, pose: &Pose) -> Result<Body, String> {
     let surface = |spec: &ShapeSpec| {
         let mut spec = spec.clone();

@@ -5,7 +5,7 @@
 use super::{Convex, Core};
 use crate::math::{Aabb, Point, Pose, Vec3, across_z, greater, lesser};
 
-/// Factor that takes up the roundings of a norm.
+/// Factor that covers the rounding of a norm.
 const UP: f64 = 1.0 + 4.0 * f64::EPSILON;
 
 impl Convex {
@@ -22,7 +22,7 @@ impl Convex {
             (low[k], high[k]) = self.core.span(&row);
         }
         // Entries of the matrix are off by some ulps of 1, dot products by some of the reach, the sum by one of the
-        // place.
+        // position.
         let pad = 16.0 * f64::EPSILON * self.reach_m + self.margin_m;
         // Two ulps further out for the sums; as a product, since stepping to the next float costs ten times as much.
         let ulps = |v: f64| 2.0 * f64::EPSILON * v.abs();
@@ -88,7 +88,7 @@ pub(super) fn reach(core: &Core) -> f64 {
 pub(super) fn ball(core: &Core) -> (Point, f64) {
     match core {
         Core::Cone { radius_m, half_m } => {
-            // The ball through apex and rim, or around the base where that is wider.
+            // The ball through apex and rim, or around the base if that is wider.
             let z_m = if *half_m > 0.0 {
                 (-radius_m * radius_m / (4.0 * half_m)).max(-half_m)
             } else {
@@ -103,8 +103,8 @@ pub(super) fn ball(core: &Core) -> (Point, f64) {
     }
 }
 
-/// Starts at the middle of the box and walks towards the farthest point in shrinking steps: within a few per cent of
-/// the least ball, which is all that a bound needs. Source: Badoiu and Clarkson 2003, Smaller core-sets for balls.
+/// Starts at the middle of the box and moves towards the farthest point in shrinking steps: within a few per cent of
+/// the least ball, which is enough for a bound. Source: Badoiu and Clarkson 2003, Smaller core-sets for balls.
 fn ball_of(points: &[Vec3]) -> (Point, f64) {
     let (mut low, mut high) = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
     for p in points {
@@ -130,7 +130,7 @@ fn ball_of(points: &[Vec3]) -> (Point, f64) {
     (Point::from(best.0), best.1 * UP)
 }
 
-/// The least ball around three points: about the longest side, or through all three where they are acute.
+/// The least ball around three points: about the longest side, or through all three if they are acute.
 fn ball_of_triangle(corners: &[Vec3; 3]) -> (Point, f64) {
     let [a, b, c] = corners;
     let (u, v) = (b - a, c - a);
@@ -145,17 +145,17 @@ fn ball_of_triangle(corners: &[Vec3; 3]) -> (Point, f64) {
         let across = u.cross(&v);
         a + (across.cross(&u) * ac + v.cross(&across) * ab) / (2.0 * across.norm_squared())
     };
-    // Of sides whose squares are too small for a number it is none.
+    // NaN if the squares of the sides underflow.
     let centre = if centre.iter().all(|x| x.is_finite()) {
         centre
     } else {
         a + (u + v) / 3.0
     };
-    // Whatever rounding did to the middle, it is a ball around them.
+    // However the centre was rounded, the ball contains them.
     (Point::from(centre), farthest(corners, &centre) * UP)
 }
 
-/// The greatest distance; where one is no number, none bounds it.
+/// The greatest distance; a NaN makes it infinite.
 fn farthest(points: &[Vec3], from: &Vec3) -> f64 {
     points.iter().fold(0.0, |most, p| {
         let distance = (p - from).norm();

@@ -3,11 +3,11 @@
 //! In: points, own frame, all different. Out: triangles that no point lies beyond, each with its neighbours, and which
 //! points are corners of the hull.
 //!
-//! Signs are exact, so nothing is thick and nothing is moved: a point in the plane of a triangle does not lie beyond
-//! it, and what lies within the hull, its faces and its edges is told from corners for certain. Refused: parry's
-//! builder, which moves vertices of thin hulls, and tolerances, which cost corners or keep what is none.
+//! Signs are exact, so nothing is thickened or moved: a point in the plane of a triangle does not lie beyond it, and
+//! points inside the hull, its faces or its edges are reliably distinguished from corners. Refused: parry's builder,
+//! which moves vertices of thin hulls, and tolerances, which lose corners or keep false ones.
 //!
-//! Signs are exact as long as no product of three differences is too small for a number; see [`is_exact`].
+//! Signs are exact as long as no product of three differences underflows; see [`is_exact`].
 //!
 //! Source: Barber, Dobkin, Huhdanpaa 1996, "The quickhull algorithm for convex hulls".
 
@@ -18,23 +18,22 @@ use crate::shape::mesh::side;
 
 const NONE: u32 = u32::MAX;
 
-/// Least size of a coordinate that is not 0, metres: f64 as large are multiples of 1e-91, and so are their
-/// differences, so that products of three still have all their digits. Below some 1e-90 points far outside would be
-/// taken for such as lie in a plane.
+/// Least size of a non-zero coordinate, metres: f64 of this size are multiples of 1e-91, and so are their differences,
+/// so that products of three still have all their digits. Below some 1e-90, points far outside would count as coplanar.
 const EXACT_MIN_M: f64 = 1e-75;
 
 /// A triangle of the surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Facet {
-    /// Places of its corners, counter-clockwise seen from outside.
+    /// Indices of its corners, counter-clockwise seen from outside.
     pub(super) corners: [u32; 3],
-    /// The facet beyond the side from each corner to the next.
+    /// The facet across the side from each corner to the next.
     pub(super) beside: [u32; 3],
 }
 
-/// The facets of the hull of points; `None` where all lie in one plane, or numbers are too small for exact products.
+/// The facets of the hull of points; `None` if all lie in one plane, or numbers are too small for exact products.
 ///
-/// Cost: O(n log n) as a rule.
+/// Cost: usually O(n log n).
 pub(super) fn facets_of(points: &[Point]) -> Option<Vec<Facet>> {
     if !is_exact(points) {
         return None;
@@ -48,14 +47,14 @@ pub(super) fn facets_of(points: &[Point]) -> Option<Vec<Facet>> {
     hull.finish()
 }
 
-/// Whether no product of coordinates' differences loses a digit because it is too small.
+/// Whether no product of coordinate differences loses a digit by underflow.
 pub(super) fn is_exact(points: &[Point]) -> bool {
     let mut all = points.iter().flat_map(|p| p.iter());
     all.all(|x| *x == 0.0 || x.abs() >= EXACT_MIN_M)
 }
 
-/// Which points are corners: at least three edges that are none by cutting a plane face meet there. Of others the
-/// facets about them lie in one plane or in two.
+/// Which points are corners: at least three true edges meet there, not counting those that only cut a plane face. The
+/// facets around other points lie in one plane or in two.
 pub(super) fn corners_of(points: &[Point], facets: &[Facet]) -> Vec<bool> {
     let mut edges = vec![0_u32; points.len()];
     for facet in facets {
@@ -71,34 +70,34 @@ pub(super) fn corners_of(points: &[Point], facets: &[Facet]) -> Vec<bool> {
     edges.into_iter().map(|count| count >= 3).collect()
 }
 
-/// A facet under way.
+/// A facet under construction.
 #[derive(Clone, Copy)]
 struct Live {
     facet: Facet,
-    /// First of the points that lie beyond it, each of which is kept at one facet.
+    /// First of the points that lie beyond it; each point is kept at one facet.
     first: u32,
     is_gone: bool,
-    /// The round in which it was looked at last, and whether the new point lay beyond it.
+    /// The round in which it was last visited, and whether the new point lay beyond it.
     seen: (u32, bool),
 }
 
 struct Quickhull<'a> {
     points: &'a [Point],
     live: Vec<Live>,
-    /// Places of facets that are gone.
+    /// Indices of removed facets.
     free: Vec<u32>,
     /// The next point beyond the same facet.
     next: Vec<u32>,
-    /// Facets with points beyond them, and others. Taken in turn: one region at a time would be cut finely beside a
+    /// Facets that may have points beyond them. Processed in turn: one region at a time would be refined next to a
     /// coarse one, in fans of which each later point sees all.
     pending: VecDeque<u32>,
     round: u32,
-    /// The new facet whose first corner it is, by point.
+    /// By point: the new facet whose first corner it is.
     begins: Vec<u32>,
 }
 
 impl<'a> Quickhull<'a> {
-    /// A tetrahedron, and what lies beyond its faces.
+    /// A tetrahedron, and the points beyond its faces.
     fn begin(points: &'a [Point]) -> Option<Self> {
         let mut hull = Self {
             points,
@@ -135,7 +134,7 @@ impl<'a> Quickhull<'a> {
         u32::try_from(self.live.len() - 1).unwrap_or(NONE)
     }
 
-    /// Puts each point with one of the facets that it lies beyond, if there is one.
+    /// Assigns each point to one of the facets that it lies beyond, if there is one.
     fn share_out(&mut self, points: impl Iterator<Item = u32>, facets: &[u32]) {
         for point in points {
             if let Some(&facet) = facets.iter().find(|facet| self.is_beyond(**facet, point)) {
@@ -150,7 +149,7 @@ impl<'a> Quickhull<'a> {
 
     fn is_beyond(&self, facet: u32, point: u32) -> bool {
         let corners = self.live[facet as usize].facet.corners;
-        // Its own corners are most of what lies in a plane.
+        // Most points in its plane are its own corners.
         if corners.contains(&point) {
             return false;
         }
@@ -158,7 +157,7 @@ impl<'a> Quickhull<'a> {
         side(a, b, c, &self.points[point as usize]).is_gt()
     }
 
-    /// Of the points kept at a facet the one farthest from it.
+    /// The farthest of the points kept at a facet.
     fn farthest(&self, facet: u32) -> Option<u32> {
         let live = &self.live[facet as usize];
         if live.is_gone || live.first == NONE {
@@ -178,7 +177,7 @@ impl<'a> Quickhull<'a> {
         Some(best.0)
     }
 
-    /// Makes a point that lies beyond a facet a vertex of the surface; `None` where signs contradict each other.
+    /// Makes a point beyond a facet a vertex of the surface; `None` if signs contradict each other.
     fn add(&mut self, facet: u32, apex: u32) -> Option<()> {
         self.round += 1;
         let (visible, rim) = self.look_from(facet, apex);
@@ -204,7 +203,7 @@ impl<'a> Quickhull<'a> {
     }
 
     /// The facets that a point lies beyond, beginning with one of them; and the sides around them, each from corner to
-    /// corner, with the facet that stays beside it.
+    /// corner, with the facet on the other side.
     fn look_from(&mut self, facet: u32, apex: u32) -> (Vec<u32>, Vec<(u32, u32, u32)>) {
         let (mut visible, mut rim) = (vec![facet], Vec::new());
         self.live[facet as usize].seen = (self.round, true);
@@ -258,7 +257,7 @@ impl<'a> Quickhull<'a> {
         Some(new)
     }
 
-    /// The facets that are left, side by side.
+    /// The remaining facets, renumbered.
     fn finish(self) -> Option<Vec<Facet>> {
         let mut places = vec![NONE; self.live.len()];
         let left = || self.live.iter().filter(|live| !live.is_gone);

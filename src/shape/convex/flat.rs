@@ -1,6 +1,6 @@
-//! Corners of what has no volume: points in one plane or on one line.
+//! Corners of point sets without volume: in one plane or on one line.
 //!
-//! In: points, own frame, all different, in the order of their coordinates. Out: which are corners of their hull.
+//! In: points, own frame, all different, sorted by their coordinates. Out: which are corners of their hull.
 //!
 //! Source: Andrew 1979, "Another efficient algorithm for convex hulls in two dimensions"; turns are exact.
 
@@ -9,11 +9,11 @@ use std::cmp::Ordering;
 use crate::math::Point;
 use crate::shape::mesh::{side, turn_yz};
 
-/// Which points are corners: seen along an axis that the plane does not hold, those at which the outline turns; of a
-/// line its ends.
+/// Which points are corners: projected along an axis that does not lie in the plane, those at which the outline turns;
+/// for a line, its ends.
 ///
 /// * `points` - at least one, `facets::is_exact`.
-/// * returns - `None` where they do not lie in one plane.
+/// * returns - `None` if they are not coplanar.
 ///
 /// Cost: O(n log n).
 pub(super) fn corners_of(points: &[Point]) -> Option<Vec<bool>> {
@@ -31,7 +31,7 @@ pub(super) fn corners_of(points: &[Point]) -> Option<Vec<bool>> {
     if !points.iter().all(|p| side(first, last, third, p).is_eq()) {
         return None;
     }
-    // No two are in one place seen so, since the plane is seen from before or from behind.
+    // No two coincide in this projection, since the axis does not lie in the plane.
     let mut order: Vec<usize> = (0..points.len()).collect();
     let (l, m) = ((axis + 1) % 3, (axis + 2) % 3);
     let key = |place: usize, k: usize| points[place][k] + 0.0;
@@ -44,8 +44,7 @@ pub(super) fn corners_of(points: &[Point]) -> Option<Vec<bool>> {
     Some(is_corner)
 }
 
-/// Marks one half of the outline: what is left of points in their order where each that makes no left turn is taken
-/// out.
+/// Marks one half of the outline: the points that remain, in order, when each that makes no left turn is removed.
 fn mark_chain<'a>(
     points: &[Point],
     axis: usize,
@@ -66,7 +65,7 @@ fn mark_chain<'a>(
     }
 }
 
-/// The turn of three points seen from far out along an axis.
+/// The turn of three points seen along an axis.
 fn turn(axis: usize, a: &Point, b: &Point, c: &Point) -> Ordering {
     let seen = |p: &Point| Point::new(p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]);
     turn_yz(&seen(a), &seen(b), &seen(c))
@@ -76,7 +75,7 @@ fn turn(axis: usize, a: &Point, b: &Point, c: &Point) -> Ordering {
 mod tests {
     use super::*;
 
-    /// Corners of points, which are brought in order first.
+    /// Corners of points, which are sorted first.
     fn corners(mut points: Vec<Point>) -> Option<Vec<Point>> {
         points.sort_by(|a, b| {
             a.coords
@@ -109,7 +108,7 @@ mod tests {
                 1
             );
         }
-        // Out of line by an ulp, in the plane all the same.
+        // Off the line by an ulp, but still in the plane.
         let triangle = [
             [0.0, 0.0, 1.0],
             [0.5, 0.5_f64.next_up(), 1.0],

@@ -1,7 +1,7 @@
 //! Hulls of points: which points matter, and the faces that manifolds are clipped from.
 //!
-//! In: points, own frame, metres. Out: a [`Hull`] that is exactly the hull of the points: only what is proved to lie
-//! within the others is left out, and nothing is moved.
+//! In: points, own frame, metres. Out: a [`Hull`] that is exactly the hull of the points: only points proved to lie
+//! within the others are left out, and nothing is moved.
 
 use super::facets::{Facet, corners_of, facets_of, is_exact};
 use super::flat;
@@ -10,17 +10,17 @@ use crate::math::{Point, Vec3};
 use crate::shape::ShapeError;
 use crate::shape::check::spread;
 
-/// What lies this near to the plane of a large triangle is of its face, as a share of the hull's size.
+/// Points this near to the plane of a large triangle belong to its face, as a share of the hull's size.
 const FACE_THICK: f64 = 1e-9;
-/// A triangle of twice this area has no normal, as a share of the size's square.
+/// A triangle with less than twice this area has no normal, as a share of the size's square.
 const NO_AREA: f64 = 1e-12;
 
-/// A hull: its points, and its faces where they could be found.
+/// A hull: its points, and its faces if they could be found.
 #[derive(Debug)]
 pub(crate) struct Hull {
     points: Vec<Vec3>,
     faces: Vec<HullFace>,
-    /// Corners of all faces, one run a face.
+    /// Corners of all faces, one run per face.
     corners: Vec<u32>,
 }
 
@@ -77,7 +77,7 @@ impl Hull {
             [] => None,
             _ => Some(corners_of(points, &facets)),
         };
-        // Where it cannot be told, all points stay.
+        // If it cannot be decided, all points stay.
         let is_corner = is_corner.unwrap_or_else(|| vec![true; points.len()]);
         let corners = is_corner.iter().filter(|is| **is).count();
         if corners > HULL_VERTICES_MAX {
@@ -110,7 +110,7 @@ impl Hull {
         &self.faces
     }
 
-    /// Places of the corners of a face, counter-clockwise seen from outside.
+    /// Indices of the corners of a face, counter-clockwise seen from outside.
     pub(crate) fn corners(&self, face: &HullFace) -> &[u32] {
         let first = face.first as usize;
         self.corners
@@ -135,7 +135,7 @@ impl Hull {
         )
     }
 
-    /// * `corners` - places of the face's corners in `points`, in any order.
+    /// * `corners` - indices of the face's corners in `points`, in any order.
     fn push_face(&mut self, normal: Vec3, mut corners: Vec<u32>) {
         if corners.len() < 3 {
             return;
@@ -155,7 +155,7 @@ impl Hull {
     }
 }
 
-/// The places of points, each once, in the order of their coordinates.
+/// The distinct points, sorted by their coordinates.
 fn places(given: &[Point]) -> Result<Vec<Point>, ShapeError> {
     for (place, point) in given.iter().enumerate() {
         check_point(place, &point.coords)?;
@@ -179,7 +179,7 @@ fn places(given: &[Point]) -> Result<Vec<Point>, ShapeError> {
     Ok(points)
 }
 
-/// Refuses points that span no volume; their greatest extent, metres.
+/// Refuses points that span no volume; returns their greatest extent, metres.
 fn check_volume(points: &[Point]) -> Result<f64, ShapeError> {
     if points.len() < 4 {
         return Err(ShapeError::TooFewPoints {
@@ -215,8 +215,8 @@ fn thickness(points: &[Point]) -> (f64, f64) {
     (normal.dot(&(fourth - first)).abs() / length, along.norm())
 }
 
-/// Plane faces: facets beside each other that lie in the plane of the largest of them. Normal, outward, and corners in
-/// any order, with some that lie on the face's edges.
+/// Plane faces: adjacent facets that lie in the plane of the largest of them. Outward normal, and corners in any order,
+/// including some that lie on the face's edges.
 fn faces_of(points: &[Point], facets: &[Facet], size_m: f64) -> Vec<(Vec3, Vec<u32>)> {
     let across = |facet: usize| {
         let [a, b, c] = facets[facet].corners.map(|k| points[k as usize]);
@@ -252,7 +252,7 @@ fn faces_of(points: &[Point], facets: &[Facet], size_m: f64) -> Vec<(Vec3, Vec<u
                 }
             }
         }
-        // What no other face meets at is within this one.
+        // A point that no other face meets is inside this one.
         let face = faces.len();
         let mut corners: Vec<u32> = Vec::new();
         for facet in all.into_iter().map(|facet| &facets[facet]) {
@@ -315,7 +315,7 @@ mod tests {
             let points: Vec<Point> = (0..2000)
                 .map(|_| {
                     let p = Vec3::new(number(), number(), number());
-                    // A third in one plane but for rounding.
+                    // A third are coplanar up to rounding.
                     let turned = Vec3::new(p.x, p.y + 0.3 * p.x, thin * p.z + 0.7 * p.x);
                     Point::from(if number() > 0.3 {
                         p.normalize() * 0.9

@@ -1,8 +1,8 @@
 //! Convex geometry: a core (point, segment, cuboid, cylinder, cone, hull, triangle) and a ball rolled around it.
 //!
-//! In: sizes in metres, own frame, axis along local z. Out: supports, boxes, bounding balls. The signed distance of
-//! two rounded shapes is that of their cores minus both margins, outside and inside alike, so a sphere is a point
-//! and a capsule a segment for every query.
+//! In: sizes in metres, own frame, axis along local z. Out: supports, boxes, bounding balls. The signed distance of two
+//! rounded shapes is that of their cores minus both margins, outside and inside alike, so for every query a sphere is a
+//! point and a capsule a segment.
 
 mod bounds;
 mod facets;
@@ -31,7 +31,7 @@ pub struct Convex {
     radius_m: f64,
 }
 
-/// What the ball is rolled around.
+/// The shape that the ball is rolled around.
 #[derive(Clone, Debug)]
 pub(crate) enum Core {
     /// The local origin.
@@ -69,7 +69,7 @@ pub(crate) enum Core {
 /// Marks a support element that is a circle rather than a vertex.
 pub(crate) const CIRCLE: u32 = 1 << 31;
 
-/// A full circle on the surface of a core: one of the things a core is the hull of.
+/// A full circle on the surface of a core: one of the elements whose hull the core is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Circle {
     /// Height of its plane along local z, metres.
@@ -140,10 +140,10 @@ impl Convex {
 
     /// The solid hull of points, which must span a volume.
     ///
-    /// Every corner is kept as given, and only what is proved to be none is left out, so the hull is exactly the hull
-    /// of the points also where it is very thin.
+    /// Every corner is kept as given, and only points proved not to be corners are left out, so the hull is exactly the
+    /// hull of the points also if it is very thin.
     ///
-    /// Cost: O(n log n) as a rule.
+    /// Cost: usually O(n log n).
     ///
     /// # Errors
     /// `NotFinite`, `TooFewPoints`, `FlatHull`, `TooManyHullVertices`, `Extent`.
@@ -154,7 +154,7 @@ impl Convex {
         ))
     }
 
-    /// The hull of points, flat ones, doubled ones and a single one too: what an offline query may hold.
+    /// The hull of points, which may be flat, duplicated or a single one: as in offline queries.
     ///
     /// # Errors
     /// `NotFinite`, `TooFewPoints` (none at all), `TooManyHullVertices`, `Extent`.
@@ -168,7 +168,7 @@ impl Convex {
         Self::build(Core::Triangle(corners.map(|p| p.coords)), 0.0)
     }
 
-    /// This shape, if each of its sizes can be computed with.
+    /// This shape, if all its sizes are usable.
     ///
     /// # Errors
     /// `NotFinite` or `Extent`, which names the size.
@@ -203,7 +203,7 @@ impl Convex {
         Ok(self)
     }
 
-    /// The point farthest along `dir` (any length; own frame). Ties are broken by place, the same way every time.
+    /// The point farthest along `dir` (any length; own frame). Ties are broken by index, always the same way.
     #[must_use]
     pub fn support(&self, dir: &Vec3) -> Point {
         let core = self.core.support(dir).0;
@@ -231,7 +231,7 @@ impl Convex {
         self.radius_m
     }
 
-    /// Corners of a hull as it is kept, own frame; empty for every other core.
+    /// The stored corners of a hull, own frame; empty for every other core.
     #[must_use]
     pub fn vertices(&self) -> &[Vec3] {
         match &self.core {

@@ -1,5 +1,5 @@
-//! Mesh files: STL (binary and text), OBJ, DAE. Own readers, because the ones at hand keep f32 coordinates, skip a
-//! DAE's up-axis, believe any size that a file claims, and cannot say in which line a mistake stands.
+//! Mesh files: STL (binary and text), OBJ, DAE. Own readers, because the available ones keep f32 coordinates, ignore a
+//! DAE's up-axis, trust any size that a file claims, and cannot report the line of an error.
 //!
 //! In: a path. Out: vertices in metres, z up, equal ones merged; faces in the file's order, objects one after another.
 
@@ -23,21 +23,21 @@ const FILE_BYTES_MAX: u64 = 1 << 31;
 
 const _: () = assert!(VERTICES_MAX < u32::MAX as usize);
 
-/// Vertices of one mesh file: three for each triangle, as STL has them.
+/// Most vertices of one mesh file: three for each triangle, as STL has them.
 const VERTICES_MAX: usize = 3 * TRIANGLES_MAX;
 
-/// What a mesh file holds.
+/// The contents of a mesh file.
 #[derive(Debug, Default)]
 pub(crate) struct Soup {
     /// Metres, z up.
     pub(crate) vertices: Vec<Point>,
-    /// Places in `vertices`, counter-clockwise seen from outside; all in range.
+    /// Indices into `vertices`, counter-clockwise seen from outside; all in range.
     pub(crate) faces: Vec<[u32; 3]>,
-    /// Things to know that did not stop the reading.
+    /// Warnings: issues that did not stop the reading.
     pub(crate) warnings: Vec<String>,
 }
 
-/// A mistake in a file: line, where there are lines, and what is wrong.
+/// An error in a file: the line, if the format has lines, and what is wrong.
 #[derive(Debug)]
 struct Flaw {
     line: Option<usize>,
@@ -76,7 +76,7 @@ impl From<ShapeError> for Flaw {
 }
 
 impl Soup {
-    /// Makes sure that `more` vertices may be added.
+    /// Checks that `more` vertices may be added.
     fn reserve(&self, more: usize) -> Result<(), Flaw> {
         if more <= VERTICES_MAX - self.vertices.len().min(VERTICES_MAX) {
             return Ok(());
@@ -86,7 +86,7 @@ impl Soup {
         )))
     }
 
-    /// Adds a vertex and yields its place.
+    /// Adds a vertex and returns its index.
     fn vertex(&mut self, vertex: Point) -> Result<u32, Flaw> {
         self.reserve(1)?;
         let place = u32::try_from(self.vertices.len()).unwrap_or(u32::MAX);
@@ -104,7 +104,7 @@ impl Soup {
     }
 }
 
-/// Where a mesh file is, if it is there and of a known kind.
+/// The path of a mesh file, if it exists and is of a known kind.
 ///
 /// * `base` - the folder of the scene file.
 ///
@@ -133,11 +133,11 @@ pub(crate) fn read(base: &Path, file: &str) -> Result<(PathBuf, Arc<[u8]>), Shap
     Ok((path, bytes.into()))
 }
 
-/// Makes sense of a mesh file's bytes.
+/// Parses a mesh file's bytes.
 ///
-/// * `path` - says its kind, and which it is in messages.
-/// * `scale` - factor on each axis of the file's coordinates (after its own unit and up-axis); where an odd number of
-///   factors is negative it mirrors, and faces are turned so that outside stays outside.
+/// * `path` - determines its kind, and names it in messages.
+/// * `scale` - factor on each axis of the file's coordinates (after its own unit and up-axis); an odd number of
+///   negative factors mirrors, and faces are turned so that outside stays outside.
 ///
 /// # Errors
 /// `Format` with the line, `Content` with `TooManyTriangles`, `NotFinite`.
@@ -166,7 +166,7 @@ fn parse(kind: Kind, bytes: &[u8]) -> Result<Soup, Flaw> {
     }
 }
 
-/// The formats that are read.
+/// The supported formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Stl,
@@ -199,7 +199,7 @@ fn unreadable(path: &Path, message: String) -> ShapeError {
     }
 }
 
-/// The bytes of a file; one that is too large is refused by its head.
+/// The bytes of a file; one that is too large is refused by its header.
 fn read_whole(path: &Path, kind: Kind) -> Result<Vec<u8>, ShapeError> {
     let failed = |e: std::io::Error| unreadable(path, e.to_string());
     let mut file = File::open(path).map_err(failed)?;
@@ -211,7 +211,7 @@ fn read_whole(path: &Path, kind: Kind) -> Result<Vec<u8>, ShapeError> {
             .read_to_end(&mut bytes)
             .map_err(failed)?;
         if let Some(given) = stl::claimed(&bytes).filter(|given| *given > TRIANGLES_MAX as u64) {
-            // A count that the file has no room for is no count.
+            // A count that does not fit into the file is no count.
             return Err(match stl::misfit(given, size) {
                 Some(message) => ShapeError::Format {
                     path: path.display().to_string(),
@@ -288,7 +288,7 @@ fn shown(word: &str) -> String {
     head.escape_default().to_string()
 }
 
-/// Lines as they end on any system: LF, CR LF, or CR alone.
+/// Lines with any line ending: LF, CR LF, or CR alone.
 fn lines(text: &str) -> impl Iterator<Item = &str> {
     let text = text.strip_suffix('\n').unwrap_or(text);
     text.split('\n')

@@ -3,7 +3,7 @@
 use super::{Flaw, Soup, lines, number, polygon, shown};
 use crate::math::Point;
 
-/// Words that carry no surface.
+/// Keywords that carry no surface.
 const SKIPPED: &[&str] = &[
     "vt",
     "vn",
@@ -51,7 +51,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Flaw> {
     Ok(soup)
 }
 
-/// What a line says, and whether a backslash at its end joins the next line. One at the end of a comment joins nothing:
+/// The content of a line, and whether a backslash at its end joins the next line. One at the end of a comment does not:
 /// it is part of the comment.
 fn cut(line: &str) -> (&str, bool) {
     if let Some((row, _)) = line.split_once('#') {
@@ -108,7 +108,7 @@ fn read_row(row: &str, line: usize, soup: &mut Soup, corners: &mut Vec<u32>) -> 
     }
 }
 
-/// The place of the vertex in `v`, `v/vt`, `v//vn` or `v/vt/vn`: from 1, or from -1 backwards.
+/// The index of the vertex in `v`, `v/vt`, `v//vn` or `v/vt/vn`: from 1, or from -1 backwards.
 fn corner(word: &str, line: usize, vertices: usize) -> Result<u32, Flaw> {
     let index = word.split('/').next().unwrap_or_default();
     let place = index.parse::<i64>().ok().and_then(|index| {

@@ -1,18 +1,18 @@
-//! Polygons into triangles: a fan where the polygon is convex, cut ears where it is not.
+//! Polygons into triangles: a fan if the polygon is convex, ear clipping if not.
 
 use crate::math::{Point, Vec3};
 
-/// Corners of a polygon that is not convex: cutting ears takes up to the third power of them.
+/// Most corners of a polygon that is not convex: ear clipping takes up to the third power of them.
 const EAR_CORNERS_MAX: usize = 1000;
 
-/// The triangles of a polygon, facing as it does.
+/// The triangles of a polygon, with its orientation.
 ///
-/// A fan of a polygon that is not convex covers what is not there and leaves out what is; ears do not.
+/// A fan of a polygon that is not convex covers area outside it and misses area inside; ears do not.
 ///
-/// * `corners` - places in `vertices`, in range, at least 3.
+/// * `corners` - indices into `vertices`, in range, at least 3.
 ///
 /// # Errors
-/// A text, when the polygon crosses itself so that no ear is found.
+/// A text, if the polygon crosses itself so that no ear is found.
 ///
 /// Source: Meisters 1975, "Polygons have ears".
 pub(super) fn cut(vertices: &[Point], corners: &[u32]) -> Result<Vec<[u32; 3]>, String> {
@@ -20,14 +20,14 @@ pub(super) fn cut(vertices: &[Point], corners: &[u32]) -> Result<Vec<[u32; 3]>, 
         return Ok(vec![[a, b, c]]);
     }
     let place = |corner: u32| vertices[corner as usize].coords;
-    // Newell's normal: twice the area, also where corners lie in line or the polygon is not quite flat.
+    // Newell's normal: twice the area, also if corners are collinear or the polygon is not quite flat.
     let origin = place(corners[0]);
     let mut normal = Vec3::zeros();
     for (k, corner) in corners.iter().enumerate() {
         let next = corners[(k + 1) % corners.len()];
         normal += (place(*corner) - origin).cross(&(place(next) - origin));
     }
-    // Seen along the axis of its largest part; mirrored where that part is negative, so that it turns to the left.
+    // Projected along the normal's largest component; mirrored if that is negative, so that it turns to the left.
     let axis = normal.iamax();
     let (u, v) = if normal[axis] >= 0.0 {
         ((axis + 1) % 3, (axis + 2) % 3)
@@ -64,7 +64,7 @@ fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Whether two points are one: only then may a corner lie on an ear.
+/// Whether two points are identical: only then may a corner lie on an ear.
 #[allow(clippy::float_cmp, reason = "the same corner, copied, not computed")]
 fn same(a: [f64; 2], b: [f64; 2]) -> bool {
     a == b
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_polygon_that_is_not_convex_is_covered_once() {
-        // A comb with three teeth, both ways round.
+        // A comb with three teeth, in both orientations.
         let outline = [
             (0.0, 0.0),
             (7.0, 0.0),

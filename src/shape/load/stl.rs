@@ -8,7 +8,7 @@ pub(super) const HEAD_BYTES: u64 = 84;
 /// One triangle of a binary file: normal, three corners, two bytes of attribute.
 const TRIANGLE_BYTES: usize = 50;
 
-/// How many triangles a binary file says it has; `None` for a text.
+/// Number of triangles that a binary file claims; `None` for a text.
 pub(super) fn claimed(bytes: &[u8]) -> Option<u64> {
     let head = bytes.get(..84)?;
     if is_text(head) {
@@ -18,12 +18,12 @@ pub(super) fn claimed(bytes: &[u8]) -> Option<u64> {
     Some(u64::from(u32::from_le_bytes(count)))
 }
 
-/// What is wrong with a binary file whose size does not go with its count.
+/// The error of a binary file whose size does not match its count.
 ///
 /// * `size` - of the whole file, bytes.
 pub(super) fn misfit(count: u64, size: u64) -> Option<String> {
     let expected = HEAD_BYTES + count * TRIANGLE_BYTES as u64;
-    // A line end behind the last triangle is a known habit of exporters.
+    // Some exporters append a line end after the last triangle.
     let fits = size.checked_sub(expected).is_some_and(|extra| extra <= 2);
     (!fits).then(|| {
         format!(
@@ -33,8 +33,8 @@ pub(super) fn misfit(count: u64, size: u64) -> Option<String> {
     })
 }
 
-/// Whether this is the head of a text file. Binary headers may begin with `solid` too: a text has no control characters
-/// but white space.
+/// Whether this is the head of a text file. Binary headers may begin with `solid` too, but a text has no control
+/// characters except white space.
 fn is_text(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(84)];
     let is_plain = head.iter().all(|b| *b >= b' ' || b.is_ascii_whitespace());
@@ -49,7 +49,7 @@ fn is_text(bytes: &[u8]) -> bool {
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Flaw> {
     let fits = |count: &u64| bytes.len() as u64 == HEAD_BYTES + count * TRIANGLE_BYTES as u64;
-    // A header of plain text whose count and size agree is binary all the same.
+    // A header of plain text whose count and size agree is binary nevertheless.
     let raw_count = bytes.get(80..84).and_then(|b| <[u8; 4]>::try_from(b).ok());
     let is_binary = raw_count.is_some_and(|raw| fits(&u64::from(u32::from_le_bytes(raw))));
     if !is_binary && is_text(bytes) {
@@ -88,7 +88,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Flaw> {
 
 /// The words of a text file with their lines.
 struct Words<'a, L> {
-    /// With their places.
+    /// With their line numbers.
     lines: L,
     words: std::str::SplitAsciiWhitespace<'a>,
     line: usize,
@@ -134,7 +134,7 @@ impl<'a, L: Iterator<Item = (usize, &'a str)>> Words<'a, L> {
 }
 
 fn parse_text(bytes: &[u8]) -> Result<Soup, Flaw> {
-    // Names behind `solid` are in any encoding; everything else is ASCII.
+    // Names after `solid` are in any encoding; everything else is ASCII.
     let text = String::from_utf8_lossy(bytes);
     let mut words = Words {
         lines: lines(&text).enumerate(),
@@ -161,7 +161,7 @@ fn parse_text(bytes: &[u8]) -> Result<Soup, Flaw> {
     Ok(soup)
 }
 
-/// What follows `facet`: a normal, which is not used, and a loop of three corners.
+/// The rest of a `facet`: a normal, which is not used, and a loop of three corners.
 fn read_facet<'a>(
     words: &mut Words<'a, impl Iterator<Item = (usize, &'a str)>>,
     soup: &mut Soup,

@@ -1,5 +1,5 @@
-//! Goal: files are read as their formats say, bad ones are refused with the line, and no bytes at all cause a panic.
-//! Method: hand-written files with known answers, another reader as a twin, and seeded damage.
+//! Goal: files are read as their formats specify, bad ones are refused with the line, and no input causes a panic.
+//! Method: hand-written files with known results, another reader as a reference, and seeded damage.
 
 use super::*;
 
@@ -60,7 +60,7 @@ fn an_obj_has_negative_places_long_lines_and_polygons() {
     }
 }
 
-/// A comment ends with its line, whatever it ends in: the next line, here the last face, was lost with it.
+/// A comment ends with its line, whatever its last character: the next line, here the last face, was lost with it.
 #[test]
 fn bug_a_comment_that_ends_in_a_backslash_joins_no_line() {
     let soup = ok(
@@ -150,7 +150,7 @@ fn too_many_triangles_are_refused_by_the_head_of_the_file() {
     );
 }
 
-/// What is no STL was told as one of hundreds of millions of triangles.
+/// A file that is no STL was reported as one of hundreds of millions of triangles.
 #[test]
 fn bug_a_count_that_the_file_has_no_room_for_is_told_as_damage() {
     let folder = std::env::temp_dir().join(format!("sweepd_short_{}", std::process::id()));

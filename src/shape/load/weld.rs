@@ -1,10 +1,10 @@
-//! Merges vertices in exactly one place: STL repeats each about six times, and the tree and box walk all of them.
+//! Merges vertices in exactly one place: STL repeats each about six times, and the tree and box visit all of them.
 
 use super::Soup;
 use crate::math::Point;
 
-/// Merges equal vertices; the first of each place stays, in the old order. Faces keep their places, also those that
-/// have no area.
+/// Merges equal vertices; the first of each place stays, in the old order. Faces keep their indices, also those without
+/// an area.
 ///
 /// Cost: O(n log n), 16 bytes a vertex while it runs.
 pub(super) fn weld(soup: &mut Soup) {
@@ -26,7 +26,7 @@ pub(super) fn weld(soup: &mut Soup) {
     order.sort_unstable_by(|a, b| {
         compare(&vertices[*a as usize], &vertices[*b as usize]).then(a.cmp(b))
     });
-    // For each vertex the first in its place, then that one's new number.
+    // For each vertex the first in its place, then the new number of that one.
     let mut first_of: Vec<u32> = (0..count).collect();
     for group in
         order.chunk_by(|a, b| compare(&vertices[*a as usize], &vertices[*b as usize]).is_eq())
@@ -45,7 +45,7 @@ pub(super) fn weld(soup: &mut Soup) {
             first_of[place as usize] = next;
             next += 1;
         } else {
-            // The first of its place comes before it and has its new number already.
+            // The first of its place precedes it and already has its new number.
             first_of[place as usize] = first_of[first as usize];
         }
     }

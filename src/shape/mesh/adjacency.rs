@@ -1,11 +1,10 @@
 //! Which faces of a mesh are neighbours, and walks from one to the next.
 //!
-//! In: the topology of the faces as they finally are. Out: for every side of a face the side of the neighbour that runs
-//! along it, and the smooth region that each face is part of. A side is named `3 * face + k`: from the face's corner
-//! `k` to the next one.
+//! In: the topology of the final faces. Out: for every side of a face the neighbour's side along it, and the smooth
+//! region of each face. A side is named `3 * face + k`: from the face's corner `k` to the next one.
 //!
-//! Sides on a border, and those that three faces or more share, have no neighbour; where the surface goes on beyond
-//! them nevertheless, they have a seam (`seams`).
+//! Sides on a border, and those shared by three faces or more, have no neighbour; if the surface continues beyond them
+//! nevertheless, they have a seam (`seams`).
 
 use super::Mesh;
 use super::seams::{self, Seam};
@@ -14,25 +13,25 @@ use crate::math::{Point, Vec3};
 
 /// No neighbour.
 pub(super) const NONE: u32 = u32::MAX;
-/// Faces whose normals differ by less than 20 degrees (cosine) are of one smooth region. Larger, and the sides of a
+/// Faces whose normals differ by less than 20 degrees (cosine) belong to one smooth region. Larger, and the sides of a
 /// coarse cylinder are one surface with its caps; smaller, and a coarse ball is many.
 const SMOOTH: f64 = 0.94;
 
 /// Neighbours and regions of the faces of a mesh.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Adjacency {
-    /// For each side that of the neighbour.
+    /// For each side the neighbour's.
     twins: Vec<u32>,
-    /// What lies beyond sides without a neighbour, by side.
+    /// The faces beyond sides without a neighbour, by side.
     seams: Vec<Seam>,
     /// For each face the least face of its region.
     regions: Vec<u32>,
-    /// Sides without a neighbour, where they are too many or too much work to look beyond; else 0.
+    /// Number of sides without a neighbour if they are too many or too much work to look beyond; else 0.
     unlooked: usize,
 }
 
 impl Adjacency {
-    /// * `mesh` - its faces as they finally are; `topology` is of the same faces, whichever way they were turned then.
+    /// * `mesh` - its final faces; `topology` is of the same faces, whichever way they were turned then.
     ///
     /// Cost: O(n), and O(log n) for each side without a neighbour.
     pub(super) fn new(topology: &Topology, mesh: &Mesh) -> Self {
@@ -51,7 +50,7 @@ impl Adjacency {
             twins[(3 * one.2 + k) as usize] = 3 * other.2 + j;
             twins[(3 * other.2 + j) as usize] = 3 * one.2 + k;
             let normals = [one.2, other.2].map(|face| normal(vertices, &faces[face as usize]));
-            // Faces without an area hang together with whatever is beside them.
+            // Faces without an area join whatever is next to them.
             let smooth = match normals {
                 [Some(x), Some(y)] if forward == back => -x.dot(&y) >= SMOOTH,
                 [Some(x), Some(y)] => x.dot(&y) >= SMOOTH,
@@ -87,17 +86,17 @@ impl Adjacency {
         }
     }
 
-    /// For each side that of the neighbour.
+    /// For each side the neighbour's.
     pub(super) fn twins(&self) -> &[u32] {
         &self.twins
     }
 
-    /// Takes other regions, and no seams.
+    /// Replaces the regions, and drops the seams.
     pub(super) fn replace_measured(&mut self, regions: Vec<u32>) {
         (self.regions, self.seams) = (regions, Vec::new());
     }
 
-    /// What `check` says where seams were not looked for.
+    /// The warning of `check` if seams were not looked for.
     pub(super) fn warning(&self) -> Option<String> {
         (self.unlooked > 0).then(|| {
             format!(

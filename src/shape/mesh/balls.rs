@@ -1,12 +1,12 @@
-//! Balls within a solid: where two of them overlap, so do the solids, and at least as deep.
+//! Inner balls of a solid: where two of them overlap, so do the solids, and at least as deep.
 //!
 //! In: a closed mesh. Out: up to [`BALLS_MAX`] balls, each wholly within it, the largest first.
 //!
 //! Candidates are balls of the medial axis, found as in Ma, Bae, Choi 2012 ("3D medial axis point approximation using
-//! nearest neighbors and the normal field"): one that touches the surface from within shrinks until nothing of the
-//! surface is in it; and the largest of them moved to where they grow. Of those each next one chosen reaches farthest
-//! out of the ones before, so that a rod has a row of them. Source of the use: inner sphere trees (Weller, Zachmann
-//! 2009), of which this is one level: what it is for is an early yes.
+//! nearest neighbors and the normal field"): one that touches the surface from within shrinks until no surface is in
+//! it; the largest of them are also moved to where they can grow. Each next one chosen reaches farthest out of the ones
+//! before, so that a rod has a row of them. Source of the use: inner sphere trees (Weller, Zachmann 2009), of which
+//! this is one level: its purpose is an early yes.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -17,11 +17,11 @@ use super::tree::{Below, NODES_WAITING_MAX, Node};
 use super::{Inside, Mesh};
 use crate::math::{Point, ROUND, Vec3, f32_near};
 
-/// Balls of one solid.
+/// Most balls of one solid.
 pub(crate) const BALLS_MAX: usize = 16;
-/// Places on the surface that a ball is looked for under.
+/// Places on the surface under which a ball is searched.
 const PLACES_MAX: usize = 64;
-/// Steps in which a ball shrinks; most have shrunk enough after four.
+/// Most steps in which a ball shrinks; most have shrunk enough after four.
 const STEPS_MAX: usize = 12;
 /// Balls that are grown before the last choice.
 const GROWN_MAX: usize = BALLS_MAX;
@@ -29,25 +29,23 @@ const GROWN_MAX: usize = BALLS_MAX;
 const GROW_STEPS_MAX: usize = 24;
 /// A ball is grown no further once its next step is not above this share of its radius.
 const GROW_MIN: f64 = 0.01;
-/// A ball is taken in while it reaches so far out of those before, as a share of the mesh's radius.
+/// A ball is kept if it reaches this far out of the earlier ones, as a share of the mesh's radius.
 const NEW_MIN: f64 = 0.02;
-/// How much smaller a ball is made than it was found, as a share of the mesh's radius: a hundred times what the
-/// distance of a face that is no sliver may be wrong by. What coordinates far from the origin are rounded by comes on
-/// top.
+/// How much smaller a ball is made than it was found, as a share of the mesh's radius: a hundred times the error of the
+/// distance of a face that is no sliver. The rounding of coordinates far from the origin is added.
 const SPARE: f64 = 1e-9;
-/// A face is a sliver below this height, as a share of its longest side: its plane is then not computed with.
+/// A face is a sliver below this height, as a share of its longest side: its plane is then not used.
 const SLIVER: f64 = 1e-4;
 
-/// On the way to a ball a point of the surface is near enough when none is nearer than this share of its distance:
-/// at 0.9 a quarter fewer overlaps are told.
+/// During the search for a ball, a point of the surface is near enough if none is nearer than this share of its
+/// distance: at 0.9 a quarter fewer overlaps are found.
 pub(super) const NEARLY: f64 = 0.97;
-/// Boxes that are looked into for a near point of the surface, at most: about the middle of a ball all of it is equally
-/// near.
+/// Most boxes visited for a near point of the surface: around the middle of a ball all of it is equally near.
 const NEAR_BOXES_MAX: usize = 2_048;
-/// Boxes that are looked into for the radius of a ball that is kept.
+/// Most boxes visited for the radius of a ball that is kept.
 const CLEAR_BOXES_MAX: usize = 32_768;
 
-/// Stands for the radius of a ball that is not there: its square is finite.
+/// Radius of an absent ball: its square is finite.
 const NO_BALL: f32 = -1e15;
 
 /// A ball, own frame of the mesh.
@@ -62,8 +60,8 @@ pub(crate) struct Ball {
 #[derive(Clone, Debug)]
 pub(crate) struct Balls {
     all: Vec<Ball>,
-    /// The same side by side, to the nearest f32: centres from the mesh's, and radii; far below zero where there is
-    /// none.
+    /// The same in columns, to the nearest f32: centres relative to the mesh's, and radii; far below zero for absent
+    /// ones.
     columns: [[f32; BALLS_MAX]; 4],
 }
 
@@ -91,7 +89,7 @@ impl Balls {
         &self.all
     }
 
-    /// The ball that holds a point, own frame, most deeply, or is nearest to it.
+    /// The ball that contains a point, own frame, most deeply, or is nearest to it.
     pub(crate) fn closest_to(&self, point: &Point) -> Ball {
         let over = |ball: &Ball| ball.radius_m - (ball.centre - point).norm();
         let deeper = |best: Ball, ball: &Ball| {
@@ -104,7 +102,7 @@ impl Balls {
         self.all.iter().fold(self.all[0], deeper)
     }
 
-    /// The ball of this and the one of `other` that overlap most, as far as f32 tells and but for a taste for large
+    /// The ball of this and the ball of `other` that overlap most, to f32 accuracy and with some preference for large
     /// ones.
     ///
     /// * `turn`, `way` - rotation of the other's frame seen from this one's, and its mesh's centre from this one's,
@@ -126,7 +124,7 @@ impl Balls {
             for lane in 0..BALLS_MAX {
                 let (dx, dy, dz) = (x[lane] - p, y[lane] - q, z[lane] - r);
                 let sum = radius[lane] + reach;
-                // Of the sign of the overlap, and no root.
+                // Has the sign of the overlap, without a root.
                 let over = sum * sum.abs() - (dx * dx + dy * dy + dz * dz);
                 let more = over > best[lane];
                 best[lane] = if more { over } else { best[lane] };
@@ -142,12 +140,12 @@ impl Balls {
 }
 
 impl Mesh {
-    /// Balls wholly within it; none of a surface, of a mesh that deforms, or of a solid too thin for any.
+    /// Balls wholly within it; `None` for a surface, a mesh that deforms, or a solid too thin for any.
     pub(crate) fn balls(&self) -> Option<&Balls> {
         self.balls.as_deref()
     }
 
-    /// The balls of a solid, while it is built.
+    /// The balls of a solid, during its construction.
     pub(super) fn find_balls(&self) -> Option<Box<Balls>> {
         if !self.solid {
             return None;
@@ -163,7 +161,7 @@ impl Mesh {
             .filter_map(|face| self.ball_under(face))
             .filter(|ball| inside.run(self, ball.centre, |_| true) != 0)
             .collect();
-        // Those that touch the surface at a given place reach into corners; most can grow where they need not.
+        // Those that touch the surface at a given place reach into corners; most can grow if they may move.
         let grown = self.choose(&found, GROWN_MAX);
         let grown = grown.iter().map(|ball| self.grow(ball));
         found.extend(grown.filter(|ball| inside.run(self, ball.centre, |_| true) != 0));
@@ -177,12 +175,12 @@ impl Mesh {
         (!chosen.is_empty()).then(|| Box::new(Balls::new(chosen, &self.centre)))
     }
 
-    /// What a distance from its surface is made smaller by, metres.
+    /// How much a distance from its surface is reduced, metres.
     pub(super) fn spare_m(&self) -> f64 {
         SPARE * self.radius + 64.0 * ROUND * self.centre.coords.amax()
     }
 
-    /// The largest ball, then each that reaches farthest out of those before, at most so many.
+    /// The largest ball, then each that reaches farthest out of the earlier ones, at most `most`.
     fn choose(&self, balls: &[Ball], most: usize) -> Vec<Ball> {
         let mut chosen: Vec<Ball> = Vec::with_capacity(most);
         while chosen.len() < most {
@@ -196,7 +194,7 @@ impl Mesh {
         chosen
     }
 
-    /// A ball moved away from what of the surface is nearest, as long as it grows.
+    /// A ball moved away from the nearest part of the surface, as long as it grows.
     fn grow(&self, ball: &Ball) -> Ball {
         let mut centre = ball.centre;
         let (mut clear_m, mut nearest) = self.near(&centre);
@@ -220,7 +218,7 @@ impl Mesh {
         }
     }
 
-    /// About the largest ball that touches a face's middle from within and holds nothing of the surface.
+    /// Approximately the largest ball that touches a face's middle from within and contains no surface.
     fn ball_under(&self, face: u32) -> Option<Ball> {
         let normal = self.face_normal(face)?;
         let [a, b, c] = self.triangle(face);
@@ -247,7 +245,7 @@ impl Mesh {
         self.near_within(point, NEAR_BOXES_MAX).0
     }
 
-    /// The same after a look into so many boxes at most, and whether none that could hold a nearer one was left.
+    /// The same, visiting at most `boxes` boxes, and whether none that could contain a nearer one was left.
     pub(super) fn near_within(&self, point: &Point, boxes: usize) -> ((f64, Point), bool) {
         let nodes = self.tree.nodes();
         let from = point - self.tree.origin();
@@ -273,7 +271,7 @@ impl Mesh {
                     (waiting[len], waiting[len + 1]) = (far, near);
                     len += 2;
                 }
-                // Of no rigid mesh.
+                // Not in a rigid mesh.
                 Below::Row(..) => {}
                 Below::Triangle(face) => {
                     let there = near_triangle(&self.triangle(face), point);
@@ -284,12 +282,12 @@ impl Mesh {
         (best, len == 0)
     }
 
-    /// A lower bound on the distance of a point from the surface, metres, but for rounding: the nearest boxes are
-    /// looked into first, and after so many the next stands for what is in it.
+    /// A lower bound on the distance of a point from the surface, metres, up to rounding: the nearest boxes are opened
+    /// first, and at the limit the next box stands for its contents.
     fn clear(&self, point: &Point) -> f64 {
         let nodes = self.tree.nodes();
         let from = point - self.tree.origin();
-        // Distances are not negative: they are in the order of their bits.
+        // Distances are non-negative, so their bits are in the same order.
         let mut waiting = BinaryHeap::from([Reverse((0, Held::Box(0)))]);
         let mut left = CLEAR_BOXES_MAX;
         while let Some(Reverse((bits, held))) = waiting.pop() {
@@ -305,7 +303,7 @@ impl Mesh {
                 Below::Nodes(one, other) => [one, other].into_iter().for_each(|place| {
                     wait(distance(&nodes[place as usize], &from), Held::Box(place));
                 }),
-                // Of no rigid mesh.
+                // Not in a rigid mesh.
                 Below::Row(..) => {}
                 Below::Triangle(face) => {
                     wait(
@@ -320,7 +318,7 @@ impl Mesh {
     }
 }
 
-/// What a search has met: a box of the tree, or a face.
+/// An item of a search: a box of the tree, or a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Held {
     Box(u32),
@@ -328,7 +326,7 @@ enum Held {
 }
 
 impl Ball {
-    /// How far it reaches out of others, or how wide it is where that is less, metres.
+    /// How far it reaches out of others, or its own width if that is less, metres.
     fn news_beside(&self, others: &[Self]) -> f64 {
         let out =
             |other: &Self| (self.centre - other.centre).norm() + self.radius_m - other.radius_m;
@@ -336,7 +334,7 @@ impl Ball {
     }
 }
 
-/// Distance of a point from a box, given from the tree's origin, metres.
+/// Distance of a point, relative to the tree's origin, from a box, metres.
 fn distance(node: &Node, from: &Vec3) -> f64 {
     let beyond = |k: usize| {
         let (low, high) = (f64::from(node.min[k]), f64::from(node.max[k]));
@@ -345,7 +343,7 @@ fn distance(node: &Node, from: &Vec3) -> f64 {
     Vec3::new(beyond(0), beyond(1), beyond(2)).norm()
 }
 
-/// A lower bound on the distance of a point from a triangle, but for rounding, and the nearest point or one near it.
+/// A lower bound on the distance of a point from a triangle, up to rounding, and the nearest point or one near it.
 fn near_triangle(corners: &[Point; 3], point: &Point) -> (f64, Point) {
     let mut best = (f64::INFINITY, corners[0]);
     let mut longest = 0.0_f64;
@@ -368,7 +366,7 @@ fn near_triangle(corners: &[Point; 3], point: &Point) -> (f64, Point) {
     let across = (b - a).cross(&(c - a));
     let area = across.norm();
     if area <= SLIVER * longest {
-        // Nowhere is it farther from its longest side than its height.
+        // No point of it is farther from its longest side than its height.
         let height_m = if longest > 0.0 {
             SLIVER * longest.sqrt()
         } else {

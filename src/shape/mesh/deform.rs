@@ -1,17 +1,17 @@
-//! A mesh whose vertices its sender moves: what it keeps of its own, and how its boxes follow.
+//! A mesh whose vertices its sender moves: its own data, and how its boxes follow.
 //!
-//! In: rows of vertices. Out: how far the farthest of them moved, at once; boxes that hold them tightly, bit by bit.
+//! In: rows of vertices. Out: how far the farthest of them moved, at once; boxes that fit them tightly, step by step.
 //!
-//! Triangles are always those of the newest vertices, so what is asked of leaves is exact. The boxes are of older ones
-//! until they are refitted: until then they hold their triangles when widened by [`Mesh::lag_m`], a sum of the updates'
-//! largest displacements (not the displacement between two moments: what went there and back has been there).
+//! Triangles always have the newest vertices, so leaf queries are exact. The boxes belong to older ones until they are
+//! refitted: until then they contain their triangles when widened by [`Mesh::lag_m`], a sum of the updates' largest
+//! displacements (not the displacement between two moments: a vertex that moved there and back has been there).
 //!
-//! The tree is made of the packs that rigid meshes have, with boxes along the axes of the mesh's frame: these are
-//! merged from below without a look at vertices, and the same kernels test them. Refused: oriented boxes (their axes
-//! would have to be found anew, and a pack is merged from boxes along its own axes only by way of all vertices below);
-//! a tree of its own kind (the walks of two kinds of pairs would be two).
+//! The tree consists of the packs that rigid meshes have, with boxes along the axes of the mesh's frame: these are
+//! merged from below without reading vertices, and the same kernels test them. Refused: oriented boxes (their axes
+//! would have to be computed again, and a pack can be merged from boxes along its own axes only through all vertices
+//! below); a tree of its own kind (the walks of two kinds of pairs would be duplicated).
 //!
-//! Vertices are f32, as on the wire: boxes then hold them without rounding.
+//! Vertices are f32, as on the wire: boxes then contain them without rounding.
 
 use super::obb::ObbPack;
 use super::topology::Sets;
@@ -48,36 +48,36 @@ impl Corners {
     }
 }
 
-/// What a mesh has that deforms.
+/// The data of a mesh that deforms.
 #[derive(Clone, Debug)]
 pub(super) struct Deform {
-    /// The vertices as they came, metres; the last number is padding.
+    /// The vertices as received, metres; the last number is padding.
     rows: Vec<[f32; 4]>,
     /// Around all boxes of each pack.
     around: Vec<Corners>,
     /// Running sum of each update's largest displacement, metres, rounded up.
     bent_m: f64,
-    /// The same, with what box and radius of the whole drew back by where that is more.
+    /// The same, but where the bounds of the whole mesh shrank by more, that counts.
     shed_m: f64,
-    /// How far a vertex may be outside of its boxes, metres.
+    /// How far a vertex may be outside its boxes, metres.
     stale_m: f64,
-    /// The same for the boxes that the refit under way has done.
+    /// The same for the boxes that the refit in progress has done.
     fresh_m: f64,
-    /// Packs that the refit under way has still to do; 0: none is under way.
+    /// Packs left in the refit in progress; 0: there is none.
     left: usize,
-    /// Surface of all boxes: of the round of refits under way, of the last, and when the tree was built.
+    /// Surface of all boxes: of the round of refits in progress, of the last, and when the tree was built.
     surface: f32,
     last_surface: f32,
     built_surface: f32,
-    /// Raised when the tree is another.
+    /// Incremented when the tree is replaced.
     revision: u32,
 }
 
 impl Mesh {
     /// The same mesh as one that deforms.
     ///
-    /// Its vertices are rounded to f32, as those on the wire are. What hangs together is said by the places of corners
-    /// in the list of vertices from now on, and no longer by where they are.
+    /// Its vertices are rounded to f32, as those on the wire are. From now on connectivity is defined by the corners'
+    /// indices in the list of vertices, no longer by their coordinates.
     ///
     /// # Errors
     /// Too many triangles or vertices, a vertex too far out, or two vertices of faces in one place.
@@ -115,7 +115,7 @@ impl Mesh {
         Ok(self)
     }
 
-    /// Its vertices as they would come in a message: one that a message may not hold would leave it unknown for ever.
+    /// Its vertices as in a message: with one that no message may contain, its place would stay unknown for ever.
     fn rows(&self) -> Result<Vec<[f32; 4]>, ShapeError> {
         #[allow(
             clippy::cast_possible_truncation,
@@ -169,7 +169,7 @@ impl Mesh {
         self.deform.is_some()
     }
 
-    /// How far a vertex may be outside of its boxes in the tree, metres; 0 for a rigid mesh.
+    /// How far a vertex may be outside its boxes in the tree, metres; 0 for a rigid mesh.
     #[inline]
     pub(crate) fn lag_m(&self) -> f64 {
         self.deform.as_ref().map_or(0.0, |deform| deform.stale_m)
@@ -181,7 +181,7 @@ impl Mesh {
         self.deform.as_ref().map_or(0.0, |deform| deform.bent_m)
     }
 
-    /// Another number means another tree.
+    /// A different number means a different tree.
     #[inline]
     pub(crate) fn tree_revision(&self) -> u32 {
         self.deform.as_ref().map_or(0, |deform| deform.revision)
@@ -189,7 +189,7 @@ impl Mesh {
 
     /// Moves vertices.
     ///
-    /// * `first` - place of the first; all of them there, every number finite and below `EXTENT_MAX_M`.
+    /// * `first` - index of the first; all of them exist, every number is finite and below `EXTENT_MAX_M`.
     /// * returns - the largest displacement, metres, rounded up; 0 for a rigid mesh, which stays as it is.
     ///
     /// Cost: some 4 ns a vertex; no allocation.
@@ -228,7 +228,8 @@ impl Mesh {
         if whole {
             (self.bounds, self.radius) = (bounds, far_m);
         } else if !moved.is_empty() {
-            // What stays is within the root's boxes, and these are no wider than all that has been there of late.
+            // Unmoved vertices are within the root's boxes, and these are no wider than what was reached since the last
+            // round.
             let (around, radius) = before.unwrap_or(then);
             self.bounds = around.merged(&bounds);
             self.radius = radius.min(self.radius).max(far_m);
@@ -237,10 +238,10 @@ impl Mesh {
         step_m
     }
 
-    /// Fits boxes to the vertices, at most so many packs of them, going on where it stopped.
+    /// Fits boxes to the vertices, at most `packs_max` packs of them, continuing where it stopped.
     ///
-    /// * returns - how many packs were done. Once the last of a round is, [`Mesh::lag_m`] is what has moved since the
-    ///   round began: 0 where nothing has.
+    /// * returns - number of packs done. After the last of a round, [`Mesh::lag_m`] is the motion since the round
+    ///   began: 0 if there was none.
     ///
     /// Source: the bottom-up update of van den Bergen 1997, "Efficient collision detection of complex deformable models
     /// using AABB trees", section 5.
@@ -270,9 +271,9 @@ impl Mesh {
     }
 }
 
-/// Whether every number of some rows can be taken: finite, and no farther out than anything may be.
+/// Whether all numbers of some rows are acceptable: finite, and within the extent limit.
 pub(crate) fn can_be_vertices(rows: &[[f32; 3]]) -> Result<(), NoVertex> {
-    // A sum of squares is finite where all are, but for overflow: the slow look then finds nothing.
+    // A sum of squares is finite if all are, except for overflow: then the slow check finds nothing.
     let all = |fits: fn(f32) -> bool| rows.iter().all(|[x, y, z]| fits(*x) & fits(*y) & fits(*z));
     #[allow(clippy::cast_possible_truncation, reason = "1e9 is near enough in f32")]
     const FAR: f32 = EXTENT_MAX_M as f32;
@@ -295,9 +296,8 @@ pub(crate) enum NoVertex {
 }
 
 impl super::Adjacency {
-    /// Keeps what is said by the places of corners in the list of vertices, and drops what was measured: seams, and
-    /// which faces are one smooth region. All that hang together over edges are one from now on: contacts are told
-    /// apart by their normals.
+    /// Keeps what is defined by the corners' indices, and drops what was measured: seams and smooth regions. Faces
+    /// connected over edges form one region from now on: contacts are distinguished by their normals.
     fn forget_places(&mut self, faces: usize) {
         let mut sets = Sets::new(faces);
         for (side, &twin) in (0u32..).zip(self.twins()) {
@@ -329,7 +329,7 @@ fn around(rows: &[[f32; 4]], face: &[u32; 3]) -> Corners {
     corners
 }
 
-/// Fits packs to vertices, those below having been fitted before; returns an eighth of the surface of their boxes.
+/// Fits packs to vertices, those below having been fitted first; returns an eighth of the surface of their boxes.
 fn fit(
     packs: &mut [ObbPack],
     boxes: &mut [Corners],
@@ -337,7 +337,7 @@ fn fit(
     range: std::ops::Range<usize>,
 ) -> f32 {
     let mut surface = [0.0; LANES];
-    // A pack stands before those below it.
+    // A pack comes before those below it.
     for at in range.rev() {
         let pack = &mut packs[at];
         let mut all = Corners::NOTHING;

@@ -1,9 +1,9 @@
-//! The inside test: how often the surface of a closed mesh winds round a point, as a walk that can stop.
+//! The inside test: how often the surface of a closed mesh winds around a point, as a walk that can stop.
 //!
 //! In: a closed, consistently oriented mesh and a point in its frame. Out: the winding number, 0 outside.
 //!
-//! A ray along +x is followed through the tree. What counts is decided by exact signs: whether the ray passes a
-//! triangle is the winding number of its outline round the ray in the plane of y and z, with the half-open rule of
+//! A ray along +x is followed through the tree. What counts is decided by exact signs: whether the ray crosses a
+//! triangle is the winding number of its outline around the ray in the plane of y and z, with the half-open rule of
 //! polygon tests, so a ray through an edge or a corner counts for exactly one of the triangles that share it. Solid
 //! angles over all triangles were refused: no tree prunes them exactly.
 
@@ -15,7 +15,7 @@ use super::predicates::{side, turn_yz};
 use super::tree::{Below, NODES_WAITING_MAX};
 use crate::math::Point;
 
-/// One inside test under way.
+/// One inside test in progress.
 #[derive(Debug)]
 pub(crate) struct Inside {
     point: Point,
@@ -47,12 +47,12 @@ impl Inside {
         self.len == 0
     }
 
-    /// How often the surface winds round the point; meaningful when finished.
+    /// How often the surface winds around the point; valid when finished.
     pub(crate) fn winding(&self) -> i64 {
         self.winding
     }
 
-    /// Tests one node. `counts` says which triangles take part (all of them, or those of one shell).
+    /// Tests one node. `counts` selects the triangles (all of them, or those of one shell).
     pub(crate) fn step(&mut self, mesh: &Mesh, counts: impl Fn(u32) -> bool) {
         let Some(top) = self.len.checked_sub(1) else {
             return;
@@ -115,7 +115,7 @@ impl Inside {
 
 impl Mesh {
     /// A lower bound on the depth of a point under the surface of a solid that does not deform, own frame, metres,
-    /// positive; `None`: it is not inside, or twice so many boxes do not tell.
+    /// positive; `None`: it is not inside, or twice this many boxes do not decide it.
     pub(crate) fn depth_of(&self, point: &Point, boxes: usize) -> Option<f64> {
         if !self.solid || self.is_deforming() {
             return None;
@@ -134,7 +134,7 @@ impl Mesh {
     }
 }
 
-/// How often a closed surface, given by its triangles, winds round a point that is not on it.
+/// How often a closed surface, given by its triangles, winds around a point that is not on it.
 pub(super) fn winding_of(point: Point, triangles: impl Iterator<Item = [Point; 3]>) -> i64 {
     let mut test = Inside::default();
     test.start(point);

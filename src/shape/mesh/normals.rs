@@ -1,11 +1,10 @@
 //! Cones of normals: of the faces under a box of the tree, with the arcs of their edges and corners.
 //!
-//! In: a mesh as it finally is. Out: for each pack of the tree the cone that holds the normals of all faces under it
-//! and of all their neighbours. The normals of an edge are the arc between those of the two faces at it, those of a
-//! corner what lies between the faces about it; a cone of no more than a right angle that holds the ends of an arc
-//! holds the arc.
+//! In: a final mesh. Out: for each pack of the tree the cone that contains the normals of all faces under it and of all
+//! their neighbours. The normals of an edge are the arc between those of its two faces, those of a corner what lies
+//! between the faces around it; a cone of no more than a right angle that contains the ends of an arc contains the arc.
 //!
-//! Some seven bytes a triangle, built with the mesh: in a tick, when somebody begins to listen, it would be late.
+//! Some seven bytes a triangle, built with the mesh: in a tick, when the first listener appears, it would be too late.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -15,16 +14,16 @@ use super::Mesh;
 use super::obb::{BoxId, Held, ObbTree};
 use crate::math::{Vec3, f32_down, f32_up};
 
-/// Added to each half angle, radians: what f32 axes are off, and more.
+/// Added to each half angle, radians: more than the error of f32 axes.
 const ROUNDED_RAD: f64 = 1e-6;
 
-/// Directions whose mean is shorter than this point nowhere.
+/// Directions whose mean is shorter than this have no common axis.
 const TOLD: f64 = 0.05;
 
 /// Directions within an angle of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Cone {
-    /// Unit. Where the cone holds every direction: a guess, or zero.
+    /// Unit. If the cone contains every direction: a guess, or zero.
     pub(crate) axis: Vec3,
     /// Half angle, radians; pi: every direction.
     pub(crate) half_rad: f64,
@@ -44,7 +43,7 @@ impl Cone {
         }
     }
 
-    /// Seen from a frame in which its own frame's axes are the columns of `rotation`.
+    /// The cone in a frame in which its own frame's axes are the columns of `rotation`.
     pub(crate) fn turned(&self, rotation: &Matrix3<f64>) -> Self {
         Self {
             axis: rotation * self.axis,
@@ -60,8 +59,8 @@ impl Cone {
         }
     }
 
-    /// A cone that holds all of these and the arcs between them: every direction where they spread over more than a
-    /// right angle from their mean, for then arcs may leave it.
+    /// A cone that contains all of these and the arcs between them: every direction if they spread over more than a
+    /// right angle from their mean, because then arcs may leave it.
     pub(crate) fn around(cones: impl Iterator<Item = Self> + Clone) -> Self {
         let (mut sum, mut count, mut widest) = (Vec3::zeros(), 0.0, 0.0_f64);
         for cone in cones.clone() {
@@ -86,7 +85,7 @@ impl Cone {
     }
 }
 
-/// The angle between two unit vectors, radians; right to some 1e-15 for small ones too.
+/// The angle between two unit vectors, radians; accurate to some 1e-15 for small ones too.
 fn angle(u: &Vec3, v: &Vec3) -> f64 {
     u.cross(v).norm().atan2(u.dot(v))
 }
@@ -94,10 +93,10 @@ fn angle(u: &Vec3, v: &Vec3) -> f64 {
 /// Cones of a mesh's boxes, own frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Normals {
-    /// By face: how far the normals about it lean from its own, radians, rounded up; pi: it has none, or not all that
-    /// lie about it were met.
+    /// By face: how far the normals around it lean from its own, radians, rounded up; pi: it has none, or not all faces
+    /// around it were found.
     spread: Vec<f32>,
-    /// By pack, of all in it: axis and half angle.
+    /// By pack, for everything in it: axis and half angle.
     packs: Vec<[f32; 4]>,
 }
 
@@ -117,7 +116,7 @@ impl Normals {
                     most = most.max(angle(&own, &normal));
                 }
             });
-            // A face about a corner that was not met may look anywhere.
+            // A face around a corner that was not found may look anywhere.
             f32_up(if whole { most + ROUNDED_RAD } else { PI })
         });
         let mut normals = Self {
@@ -129,7 +128,7 @@ impl Normals {
         normals
     }
 
-    /// Fills the cones of a pack and of all below it; appends the faces that they are of.
+    /// Fills the cones of a pack and of all below it; appends their faces.
     fn fill(&mut self, mesh: &Mesh, tree: &ObbTree, pack: u32, faces: &mut Vec<u32>) {
         let from = faces.len();
         let mask = tree.packs()[pack as usize].mask;
@@ -161,11 +160,11 @@ impl Normals {
 }
 
 impl Mesh {
-    /// The outward normals of the faces under a box, of their edges and of their corners, own frame; of a surface,
-    /// which can be touched from both sides, and of a mesh that deforms, every direction.
+    /// The outward normals of the faces under a box, of their edges and of their corners, own frame; every direction
+    /// for a surface, which can be touched from both sides, and for a mesh that deforms.
     pub(crate) fn normals(&self, id: BoxId) -> Cone {
         if self.is_deforming() {
-            // Cones are those of the faces as they were when it was made.
+            // The cones belong to the faces as they were when the mesh was made.
             let own = match self.obb.held(id) {
                 Held::Triangle(face) => self.face_normal(face),
                 Held::Pack(_) => None,
@@ -246,8 +245,8 @@ mod tests {
         assert_eq!(narrow, mesh.faces.len());
     }
 
-    /// A cone of many faces, the bottom a fan about its middle: the rings of tip and middle are cut, and what was met
-    /// of them were faces on one side of the axis.
+    /// A cone of many faces, with a fan about its middle as the bottom: the rings of tip and middle are cut off, and
+    /// the faces found were all on one side of the axis.
     #[test]
     fn bug_faces_about_a_corner_of_very_many_have_any_normal() {
         let fan = |n: u32| {

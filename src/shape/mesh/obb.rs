@@ -1,8 +1,8 @@
 //! A static tree of oriented boxes over triangles, eight children a node: one triangle a leaf.
 //!
 //! In: triangles. Out: packs of eight boxes for `simd::obb`, each pack in f32 relative to an f64 origin of its own, so
-//! that rounding is a share of what is near and not of the whole mesh. Boxes hold their triangles exactly: half sides
-//! are measured in f64 against the rounded axes and centre, and rounded up.
+//! that rounding is relative to the neighbourhood and not to the whole mesh. Boxes contain their triangles exactly:
+//! half sides are measured in f64 against the rounded axes and centre, and rounded up.
 //!
 //! Source: Gottschalk, Lin, Manocha 1996, OBBTree; axes are those of the area's covariance, or of the mesh's frame
 //! where these fit tighter.
@@ -52,9 +52,9 @@ const LANES_U32: u32 = LANES as u32;
 pub(crate) struct ObbPack {
     /// The boxes.
     pub(crate) boxes: Pack,
-    /// What their centres are relative to, mesh's frame.
+    /// The origin of their centres, mesh's frame.
     pub(crate) origin: Point,
-    /// Greatest sum of a centre's coordinates and half sides, metres: what rounding is a share of.
+    /// Greatest sum of a centre's coordinates and half sides, metres: the scale of rounding.
     pub(crate) reach: f32,
     /// A bit for each lane that holds a box.
     pub(crate) mask: u8,
@@ -64,7 +64,7 @@ pub(crate) struct ObbPack {
 /// What a box holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Held {
-    /// One triangle, by its place in the mesh; of a tree over the shapes of a body one shape.
+    /// One triangle, by its index in the mesh; in a tree over the shapes of a body, one shape.
     Triangle(u32),
     /// The boxes of a pack.
     Pack(u32),
@@ -75,14 +75,14 @@ pub(crate) enum Held {
 pub(crate) struct Obb {
     /// Centre, metres.
     pub(crate) centre: Point,
-    /// Unit axes but for rounding to f32, one a column.
+    /// Unit axes up to rounding to f32, one a column.
     pub(crate) axes: Matrix3<f64>,
     /// Half sides, metres.
     pub(crate) half: [f32; 3],
 }
 
 impl Obb {
-    /// Of what no box is known of.
+    /// Stands for an unknown box.
     pub(crate) const EVERYWHERE: Self = Self {
         centre: Point::new(0.0, 0.0, 0.0),
         axes: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
@@ -101,7 +101,7 @@ impl Obb {
     }
 }
 
-/// The tree. Pack 0 holds the root alone; a pack stands before those below it.
+/// The tree. Pack 0 holds only the root; a pack comes before those below it.
 #[derive(Clone, Debug)]
 pub(crate) struct ObbTree {
     packs: Vec<ObbPack>,
@@ -128,7 +128,7 @@ impl ObbTree {
         tree
     }
 
-    /// A tree over at least one triangle, with boxes along the axes of the mesh's frame that are yet to be measured;
+    /// A tree over at least one triangle, with boxes along the axes of the mesh's frame that are measured later;
     /// centres are relative to the origin of that frame.
     pub(super) fn aligned(vertices: &[Point], faces: &[[u32; 3]]) -> Self {
         let mut tree = Self {
@@ -144,7 +144,7 @@ impl ObbTree {
         tree
     }
 
-    /// Appends aligned packs over `order`, at least two triangles; returns the place of the first.
+    /// Appends aligned packs over `order`, at least two triangles; returns the index of the first.
     fn lay_out(&mut self, order: &mut [(u32, Vec3)]) -> u32 {
         let place = self.packs.len();
         let parts = split(order, parts_of(order.len()));
@@ -159,7 +159,7 @@ impl ObbTree {
         u32::try_from(place).unwrap_or(0)
     }
 
-    /// The packs, to be measured anew.
+    /// The packs, to be measured again.
     pub(super) fn packs_mut(&mut self) -> &mut [ObbPack] {
         &mut self.packs
     }
@@ -174,7 +174,7 @@ impl ObbTree {
         self.packs[id.pack() as usize].below(id.lane())
     }
 
-    /// A box by itself.
+    /// A single box.
     pub(crate) fn get(&self, id: BoxId) -> Obb {
         let pack = &self.packs[id.pack() as usize];
         let (boxes, lane) = (&pack.boxes, id.lane());
@@ -186,7 +186,7 @@ impl ObbTree {
         }
     }
 
-    /// Appends the packs over `order`, at least two triangles; returns the place of the first.
+    /// Appends the packs over `order`, at least two triangles; returns the index of the first.
     fn build(&mut self, order: &mut [(u32, Vec3)], corners: &impl Fn(u32) -> [Point; 3]) -> u32 {
         let place = self.packs.len();
         self.packs.push(ObbPack::empty());
@@ -217,8 +217,8 @@ fn middles(vertices: &[Point], faces: &[[u32; 3]]) -> Vec<(u32, Vec3)> {
         .collect()
 }
 
-/// How many children a pack over so many triangles gets. Full packs below: as few children as reach, each a power of
-/// eight or a little less.
+/// How many children a pack over this many triangles gets. Full packs below: as few children as suffice, each a power
+/// of eight or a little less.
 fn parts_of(triangles: usize) -> usize {
     let mut below = 1;
     while below * LANES < triangles {
@@ -227,7 +227,7 @@ fn parts_of(triangles: usize) -> usize {
     triangles.div_ceil(below)
 }
 
-/// Parts triangles into `parts` groups of nearly equal size, by halves along the longest axis of their middles.
+/// Splits triangles into `parts` groups of nearly equal size, by halves along the longest axis of their middles.
 fn split(order: &mut [(u32, Vec3)], parts: usize) -> Vec<&mut [(u32, Vec3)]> {
     if parts <= 1 {
         return vec![order];
@@ -250,7 +250,7 @@ fn split(order: &mut [(u32, Vec3)], parts: usize) -> Vec<&mut [(u32, Vec3)]> {
 }
 
 impl ObbPack {
-    /// So many boxes along the axes of the frame, of no size yet.
+    /// `boxes` boxes along the axes of the frame, of no size yet.
     fn aligned(boxes: usize) -> Self {
         let mut pack = Self::empty();
         for k in 0..3 {
@@ -281,7 +281,7 @@ impl ObbPack {
         }
     }
 
-    /// Rounds boxes to f32 and measures what they then must reach to.
+    /// Rounds boxes to f32 and measures the half sides that they then need.
     fn of(fitted: &[(Fitted, u32)]) -> Self {
         let mut pack = Self::empty();
         let mean = fitted.iter().map(|(f, _)| f.centre.coords).sum::<Vec3>();

@@ -1,16 +1,16 @@
-//! How far a mesh reaches in any direction, from a table of directions: its box at a pose costs the same for any
-//! number of triangles.
+//! How far a mesh reaches in any direction, from a table of directions: its box at a pose costs the same for any number
+//! of triangles.
 //!
 //! In: exact reaches at the nodes of a grid on the faces of a cube. Out: an upper bound for any direction.
 //!
-//! The reach `h(d)`, the greatest `d . v` over all vertices, is convex and grows with the length of `d`: where `d` is
-//! a sum of grid directions with weights that are not negative, `h(d)` is at most the same sum of their reaches. The
-//! weights are bilinear in the grid's cell. Along the axes of the mesh the bound is exact; for a sphere it is at most
-//! 0.4 % too large.
+//! The reach `h(d)`, the greatest `d . v` over all vertices, is convex and scales with the length of `d`: if `d` is a
+//! sum of grid directions with non-negative weights, `h(d)` is at most the same sum of their reaches. The weights are
+//! bilinear in the grid's cell. Along the axes of the mesh the bound is exact; for a sphere it is at most 0.4 % too
+//! large.
 
 use crate::math::{Vec3, f32_up};
 
-/// Cells along a side of a cube face: the error falls with the square. 16 make 7 kB a mesh.
+/// Cells along a side of a cube face: the error falls with their square. 16 make 7 kB a mesh.
 const CELLS: usize = 16;
 const NODES: usize = CELLS + 1;
 
@@ -42,7 +42,7 @@ impl Outline {
         Self { reach: all }
     }
 
-    /// An upper bound on `direction . v` over all vertices, but for rounding.
+    /// An upper bound on `direction . v` over all vertices, up to rounding.
     pub(super) fn reach(&self, direction: &Vec3) -> f64 {
         let axis = direction.iamax();
         let largest = direction[axis].abs();
@@ -63,7 +63,7 @@ fn count(k: usize) -> f64 {
     f64::from(u32::try_from(k).unwrap_or(u32::MAX))
 }
 
-/// The cell of a coordinate in [-1, 1], and the place in it from 0 to 1.
+/// The cell of a coordinate in [-1, 1], and the position in it from 0 to 1.
 fn cell(x: f64) -> (usize, f64) {
     let scaled = (x.clamp(-1.0, 1.0) + 1.0) * 0.5 * count(CELLS);
     #[allow(

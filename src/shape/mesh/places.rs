@@ -1,5 +1,5 @@
-//! The boxes of a mesh for rays, planes and points, whichever tree it has: a place is a node of the binary tree of a
-//! rigid mesh, or a box of the packs of one that deforms.
+//! The boxes of a mesh for rays, planes and points, for either tree: a place is a node of the binary tree of a rigid
+//! mesh, or a box in the packs of one that deforms.
 
 use super::tree::{Below, Node};
 use super::{BoxId, Held, Mesh};
@@ -34,7 +34,7 @@ impl Mesh {
         }
     }
 
-    /// What the boxes at places are relative to, own frame.
+    /// The origin of the boxes at places, own frame.
     pub(crate) fn places_origin(&self) -> Point {
         if self.is_deforming() {
             Point::origin()
@@ -43,7 +43,7 @@ impl Mesh {
         }
     }
 
-    /// A box around all of it, relative to [`Mesh::centre`].
+    /// A box around the whole mesh, relative to [`Mesh::centre`].
     pub(crate) fn whole(&self) -> Node {
         if self.is_deforming() {
             let from = self.bounds.min - self.centre;
@@ -53,7 +53,7 @@ impl Mesh {
         }
     }
 
-    /// The children of a place, each by its place, a mask's lanes ascending; none of a leaf.
+    /// Visits the places of the children of a place, in ascending lanes of a mask; a leaf has none.
     pub(crate) fn each_below(&self, place: u32, mut visit: impl FnMut(u32)) {
         match self.below(place) {
             Below::Triangle(_) => {}

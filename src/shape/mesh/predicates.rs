@@ -1,7 +1,7 @@
-//! Exact signs: on which side of a line or a plane a point lies, for the f64 coordinates as they are.
+//! Exact signs: on which side of a line or a plane a point lies, for the given f64 coordinates.
 //!
-//! In: points. Out: the sign of a determinant, never wrong where coordinates are 0 or at least 1e-75 in size, so that
-//! no product is too small for a number: a filter decides nearly always, expansions decide the rest.
+//! In: points. Out: the sign of a determinant, never wrong if coordinates are 0 or at least 1e-75 in size, so that no
+//! product underflows: a filter decides nearly always, expansions decide the rest.
 //!
 //! Source: Shewchuk 1997, Adaptive precision floating-point arithmetic and fast robust geometric predicates.
 
@@ -9,8 +9,8 @@ use std::cmp::Ordering;
 
 use crate::math::{Point, ROUND};
 
-/// Parts that the determinant of three exact differences can have: 3 products of a 16-part minor with a 2-part
-/// difference, each at most 64 parts.
+/// Most parts of the determinant of three exact differences: 3 products of a 16-part minor with a 2-part difference,
+/// each at most 64 parts.
 const PARTS_MAX: usize = 192;
 
 /// A sum of f64 that do not overlap, least first: an exact number.
@@ -66,7 +66,7 @@ impl Expansion {
     }
 
     fn sign(&self) -> Ordering {
-        // The last part outweighs all others together.
+        // The last part exceeds all others together.
         let top = if self.len == 0 {
             0.0
         } else {
@@ -80,7 +80,7 @@ fn sign_of(x: f64) -> Ordering {
     x.partial_cmp(&0.0).unwrap_or(Ordering::Equal)
 }
 
-/// `a + b` as a rounded sum and its exact rest (Knuth).
+/// `a + b` as a rounded sum and its exact error (Knuth).
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_part = sum - a;
@@ -88,7 +88,7 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
     (sum, (a - a_part) + (b - b_part))
 }
 
-/// `a * b` as a rounded product and its exact rest (Dekker; no fused operation, see the house rules).
+/// `a * b` as a rounded product and its exact error (Dekker; no fused operation, see the house rules).
 fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
     let ((a_high, a_low), (b_high, b_low)) = (split(a), split(b));
@@ -97,7 +97,7 @@ fn two_product(a: f64, b: f64) -> (f64, f64) {
 }
 
 fn split(a: f64) -> (f64, f64) {
-    // 2^27 + 1 parts 53 bits in two halves whose products are exact.
+    // 2^27 + 1 splits 53 bits into two halves whose products are exact.
     let scaled = 134_217_729.0 * a;
     let high = scaled - (scaled - a);
     (high, a - high)
@@ -150,7 +150,7 @@ pub(super) fn is_on(triangle: &[Point; 3], p: &Point) -> bool {
         let (low, high) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
         low <= p[k] && p[k] <= high
     };
-    // In a plane with it, and seen along no axis on both sides of its edges.
+    // Coplanar with it, and seen along no axis on both sides of its edges.
     let seen_on = |k: usize| {
         let turned = |q: &Point| Point::new(q[k], q[(k + 1) % 3], q[(k + 2) % 3]);
         let ([a, b, c], p) = ([a, b, c].map(turned), turned(p));

@@ -1,9 +1,9 @@
-//! The neighbours of each vertex, side by side, for walks that go from vertex to vertex.
+//! The neighbours of each vertex in contiguous lists, for walks that go from vertex to vertex.
 //!
-//! In: a mesh with its twins. Out: for every vertex whose faces close to one ring its neighbours; of others a side that
-//! starts there, from which `Mesh::go_round` passes face by face.
+//! In: a mesh with its twins. Out: for every vertex whose faces close to one ring its neighbours; for others a side
+//! that starts there, from which `Mesh::go_round` visits face by face.
 //!
-//! Going round by twins is a chain of loads, each waiting for the one before; of a list all are under way at once.
+//! Going round by twins is a chain of dependent loads; the loads of a list are all in flight at once.
 
 use super::Mesh;
 use super::adjacency::NONE;
@@ -11,7 +11,7 @@ use super::adjacency::NONE;
 /// Lists by vertex: 16 bytes a triangle.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rings {
-    /// For each vertex where its list begins, and the end of all.
+    /// For each vertex the start of its list, and the end of all.
     from: Vec<u32>,
     vertices: Vec<u32>,
     /// A side that starts at each vertex.
@@ -19,7 +19,7 @@ pub(super) struct Rings {
 }
 
 impl Rings {
-    /// * `mesh` - its faces as they finally are, and their neighbours.
+    /// * `mesh` - its final faces, and their neighbours.
     ///
     /// Cost: O(n).
     pub(super) fn new(mesh: &Mesh) -> Self {
@@ -40,8 +40,8 @@ impl Rings {
             let begin = vertices.len();
             if side != NONE {
                 let closed = mesh.go_round(side, |side| vertices.push(mesh.start_of(side)));
-                // Where more faces have this vertex than were met, another ring touches it. The last to be met was the
-                // first.
+                // If this vertex has more faces than were visited, another ring touches it. The last one visited equals
+                // the first.
                 let all = closed.filter(|met| *met == faces).unwrap_or_default();
                 vertices.truncate(begin + all as usize);
             }
@@ -51,7 +51,7 @@ impl Rings {
         rings
     }
 
-    /// The neighbours of a vertex; none: they are not kept.
+    /// The neighbours of a vertex; empty: they are not kept.
     #[inline]
     pub(super) fn of(&self, vertex: u32) -> &[u32] {
         let range = self.from.get(vertex as usize..vertex as usize + 2);

@@ -1,35 +1,35 @@
-//! Neighbours that share no whole edge: tiles laid in bond, corners that were not welded, sheets that are doubled.
+//! Neighbours that share no whole edge: tiles laid in bond, corners that were not welded, doubled sheets.
 //!
-//! In: a mesh and its sides that have no neighbour. Out: for each the faces that lie just beyond it. They are no part
-//! of the topology (such a mesh is open); they tell where the surface goes on.
+//! In: a mesh and its sides without a neighbour. Out: for each the faces just beyond it. They are not part of the
+//! topology (such a mesh is open); they show where the surface continues.
 
 use super::tree::{Below, NODES_WAITING_MAX};
 use super::{Mesh, adjacency::NONE};
 use crate::math::Point;
 
-/// Where along a side is looked beyond it: near its ends too, for what lies beyond a corner of a tile may begin just
-/// there.
+/// Positions along a side at which to look beyond it: near its ends too, because what lies beyond a corner of a tile
+/// may begin just there.
 const LOOKS: [f64; 5] = [0.01, 0.2, 0.5, 0.8, 0.99];
-/// How far beyond a side is looked, as a share of the mesh's radius: narrower cracks are none.
+/// Distance to look beyond a side, as a share of the mesh's radius: narrower cracks are ignored.
 const BEYOND: f64 = 1e-6;
-/// Sides without a neighbour of one mesh; of more none is looked beyond, and a warning says so. Each look takes a
-/// microsecond or two: a quarter of a million are the time of reading as many triangles.
+/// Most sides without a neighbour of one mesh; with more, none is looked beyond, and a warning says so. Each look takes
+/// a microsecond or two: a quarter of a million take as long as reading as many triangles.
 const SIDES_MAX: usize = 1 << 18;
 
-/// Nodes of the tree that are passed for all of them: a side of a compact mesh takes some hundreds, one of large
-/// triangles that all lie across each other takes as many as there are. About a second.
+/// Most tree nodes visited for all of them: a side of a compact mesh takes some hundreds, one of large triangles that
+/// all cross each other takes as many as there are. About a second.
 const NODES_MAX: usize = 1 << 28;
-/// A face that is asked takes as long as so many nodes.
+/// Testing a face takes as long as visiting this many nodes.
 const NODES_PER_FACE: usize = 16;
 
-/// A side, and faces beyond it; [`NONE`] where there is none.
+/// A side, and the faces beyond it; [`NONE`] if there is none.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seam {
     pub(super) side: u32,
     pub(super) faces: [u32; LOOKS.len()],
 }
 
-/// The seams of a mesh, by side; `None` where they are too much work.
+/// The seams of a mesh, by side; `None` if they are too much work.
 pub(super) fn find(mesh: &Mesh, twins: &[u32]) -> Option<Vec<Seam>> {
     find_within(mesh, twins, NODES_MAX)
 }
@@ -54,9 +54,9 @@ fn find_within(mesh: &Mesh, twins: &[u32], nodes_max: usize) -> Option<Vec<Seam>
 }
 
 impl Mesh {
-    /// A face just beyond a side, at a place along it.
+    /// A face just beyond a side, at a position along it.
     ///
-    /// * `left` - nodes that may still be passed; at 0 nothing is said.
+    /// * `left` - nodes that may still be visited; at 0 nothing is reported.
     fn face_beyond(&self, side: u32, t: f64, left: &mut usize) -> Option<u32> {
         let face = side / 3;
         let normal = self.face_normal(face)?;
@@ -106,7 +106,7 @@ impl Mesh {
         None
     }
 
-    /// Whether a point is within about so many metres of a face that has an area.
+    /// Whether a point is within about `metres` of a face that has an area.
     fn is_near(&self, face: u32, point: &Point, metres: f64) -> bool {
         let Some(normal) = self.face_normal(face) else {
             return false;
@@ -141,7 +141,7 @@ mod tests {
         let soup = Mesh::new(vertices, faces, None).unwrap();
         let twins = soup.adjacency.twins();
         assert!(find_within(&soup, twins, 100_000).is_none());
-        // A sheet of sixteen times as many triangles has a border, and the time for it.
+        // A sheet of sixteen times as many triangles has a border, and enough time for it.
         let sheet = sheet(64);
         assert!(find_within(&sheet, sheet.adjacency.twins(), 100_000).is_some());
     }

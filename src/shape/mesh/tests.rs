@@ -1,4 +1,4 @@
-//! Goal: meshes are built as they say: shells, orientation, solids, tree, inside tests. Method: small solids by hand.
+//! Goal: meshes are built as specified: shells, orientation, solids, tree, inside tests. Method: small solids by hand.
 
 use super::*;
 
@@ -177,7 +177,7 @@ fn the_box_of_a_large_mesh_holds_it_and_is_hardly_larger() {
     }
 }
 
-/// A ball of 4 n (n - 1) triangles, closed, with bumps of this size.
+/// A closed ball of 4 n (n - 1) triangles, with bumps of this size.
 pub(crate) fn ball(n: u32, bump: f64) -> Mesh {
     let (mut vertices, mut faces) = (vec![Point::new(0.0, 0.0, 1.0)], Vec::new());
     for row in 1..n {
@@ -221,8 +221,8 @@ pub(super) fn sheet(n: u32) -> Mesh {
     Mesh::new(vertices.collect(), faces.collect(), Some(false)).unwrap()
 }
 
-/// Where a vertex has its neighbours listed they are those that one comes by face by face; on a border, and where two
-/// rings touch, it has none.
+/// If a vertex lists its neighbours, they are those found face by face; on a border, and where two rings touch, it
+/// lists none.
 #[test]
 fn the_ring_of_a_vertex_holds_each_neighbour_once() {
     let ball = ball(12, 0.1);
@@ -244,7 +244,7 @@ fn the_ring_of_a_vertex_holds_each_neighbour_once() {
     let sheet = sheet(4);
     let listed = |v: u32| !sheet.rings.of(v).is_empty();
     assert_eq!((0..25).filter(|v| listed(*v)).count(), 9, "the inner ones");
-    // Two boxes that share one corner by its number.
+    // Two boxes that share one corner by index.
     let (mut vertices, mut faces) = cuboid([0.0; 3], 1.0, false);
     let (more, other) = cuboid([2.0; 3], 1.0, false);
     let shared = |v: u32| (more[v as usize] - Point::new(1.0, 1.0, 1.0)).norm() < 1e-12;

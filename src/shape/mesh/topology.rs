@@ -1,16 +1,16 @@
-//! What a mesh is made of: which edges are open, which faces hang together, which way they face.
+//! The topology of a mesh: which edges are open, which faces are connected, which way they face.
 //!
-//! In: vertices and faces as read. Out: shells, counts of defects, and faces turned where they must be. Vertices in
-//! exactly one place are one here (STL repeats them); the mesh itself keeps its own.
+//! In: vertices and faces as read. Out: shells, counts of defects, and faces turned where necessary. Vertices in
+//! exactly one place are merged here (STL repeats them); the mesh itself keeps its own.
 
 use crate::math::{Point, Vec3};
 
-/// A set of faces that hang together by their vertices.
+/// A set of faces connected by their vertices.
 #[derive(Clone, Debug)]
 pub(super) struct Shell {
     /// One of its vertices, by place in the mesh.
     pub(super) vertex: u32,
-    /// What it encloses, cubic metres; negative when it faces inwards.
+    /// Enclosed volume, cubic metres; negative when it faces inwards.
     pub(super) volume: f64,
     /// Corners of its box.
     pub(super) low: Point,
@@ -23,13 +23,13 @@ pub(super) struct Shell {
 pub(super) struct Defects {
     /// Edges with one face.
     pub(super) open: usize,
-    /// Edges whose faces do not cancel, though there are two or more.
+    /// Edges whose faces do not cancel, with two faces or more.
     pub(super) inconsistent: usize,
     /// Faces without an area.
     pub(super) flat: usize,
     /// Faces more than a million times as long as high.
     pub(super) needles: usize,
-    /// Faces on the same three corners as one before.
+    /// Faces on the same three corners as an earlier one.
     pub(super) duplicates: usize,
     /// Vertices that no face names.
     pub(super) unreferenced: usize,
@@ -76,12 +76,12 @@ impl Topology {
         all
     }
 
-    /// The uses of each edge: lesser and greater vertex, face, direction when they were read.
+    /// The uses of each edge: lesser and greater vertex, face, direction as read.
     pub(super) fn edge_uses(&self) -> impl Iterator<Item = &[EdgeUse]> {
         self.edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1))
     }
 
-    /// Which side of its face a use is now, and whether it runs from the lesser to the greater vertex.
+    /// The side of its face that a use is now, and whether it runs from the lesser to the greater vertex.
     pub(super) fn side_of(&self, of: &EdgeUse, faces: &[[u32; 3]]) -> Option<(u32, bool)> {
         let corners = faces[of.2 as usize].map(|v| self.welded[v as usize]);
         (0u32..3).zip(0..3).find_map(|(k, i)| {
@@ -154,7 +154,7 @@ impl Topology {
         self.measure(vertices, faces);
     }
 
-    /// Volumes, each about a vertex of its own shell so that far shells keep their digits.
+    /// Volumes, each about a vertex of its own shell, so that far shells keep their digits.
     pub(super) fn measure(&mut self, vertices: &[Point], faces: &[[u32; 3]]) {
         for shell in &mut self.shells {
             shell.volume = 0.0;
@@ -166,8 +166,8 @@ impl Topology {
         }
     }
 
-    /// Turns faces so that neighbours agree and each part encloses a positive volume; `None` when an edge does not
-    /// have exactly two faces, or the surface has one side only (a Klein bottle). Else how many were turned.
+    /// Turns faces so that neighbours agree and each part encloses a positive volume; `None` if an edge does not have
+    /// exactly two faces, or the surface has one side only (a Klein bottle). Else the number of turned faces.
     pub(super) fn orient(&self, vertices: &[Point], faces: &mut [[u32; 3]]) -> Option<usize> {
         let mut sets = Sets::new(faces.len());
         for uses in self.edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
@@ -230,7 +230,7 @@ fn edge_uses(welded: &[u32], faces: &[[u32; 3]]) -> Vec<EdgeUse> {
         let corners = face.map(|v| welded[v as usize]);
         for k in 0..3 {
             let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            // A face with two corners in one place is a line there and back: its two edges cancel by themselves.
+            // A face with two corners in one place is a line there and back: its two edges cancel each other.
             if a != b {
                 edges.push((a.min(b), a.max(b), i, a < b));
             }
@@ -265,13 +265,13 @@ impl Sets {
         (at, odd)
     }
 
-    /// Joins two sets; false when they are one already and disagree.
+    /// Joins two sets; false if they are already one and disagree.
     pub(super) fn join(&mut self, a: u32, b: u32, opposite: bool) -> bool {
         let ((a, odd_a), (b, odd_b)) = (self.root(a), self.root(b));
         if a == b {
             return odd_a ^ odd_b == opposite;
         }
-        // The lesser place stays the root, so that results do not depend on the order of joining.
+        // The lesser index stays the root, so that results do not depend on the order of joining.
         let (low, high) = (a.min(b), a.max(b));
         self.parent[high as usize] = (low, odd_a ^ odd_b ^ opposite);
         true

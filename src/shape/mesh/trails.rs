@@ -1,20 +1,20 @@
-//! Where walks over a surface have led: one that comes by where an earlier one did goes on from the end of that.
+//! A cache of where walks over a surface have led: a walk that meets an earlier one continues from the end of that.
 //!
-//! Leaves that cross lie side by side along a curve, and from each of them a walk leads over much the same faces to
-//! much the same place. What a walk finds is still told by its own last steps.
+//! Leaves that cross are next to each other along a curve, and from each of them a walk leads over much the same faces
+//! to much the same place. The result of a walk is still decided by its own last steps.
 
 use crate::math::Vec3;
 
-/// How many are kept, as a power of two: about the vertices about the curve along which two bodies of 20,000 triangles
-/// cross. Twice as many save some more steps, and cost as much to bring from memory.
+/// Number of entries, as a power of two: about the vertices near the curve along which two bodies of 20,000 triangles
+/// cross. Twice as many save some more steps, and cost as much to load from memory.
 const TRAILS_LOG: u32 = 9;
-/// Directions this close (cosine of 37 degrees) lead the same way for most of it: what is gone wrong at the end costs
-/// less than the whole way.
+/// Directions this close (cosine of 37 degrees) lead the same way for most of it: correcting the end costs less than
+/// the whole way.
 const SAME_WAY: f64 = 0.8;
 
-/// What walks have come to, by the vertex that they passed or began from: the last one of those that share a place.
+/// The ends of walks, by the vertices that they passed or began from; of those that share a slot, the last one.
 ///
-/// Takes no memory before the first walk: most pairs are of no meshes.
+/// Takes no memory before the first walk: most pairs have no meshes.
 #[derive(Debug, Default)]
 pub(crate) struct Trails<End> {
     entries: Vec<Entry<End>>,
@@ -24,15 +24,15 @@ pub(crate) struct Trails<End> {
 #[derive(Clone, Copy, Debug, Default)]
 struct Entry<End> {
     vertex: u32,
-    /// Of which search.
+    /// The search it belongs to.
     search: u32,
-    /// No direction is near that of an entry not in use, which is zero.
+    /// Zero in an unused entry: no direction is near it.
     direction: [f32; 3],
     end: End,
 }
 
 impl<End: Copy + Default> Trails<End> {
-    /// Forgets all: another search begins, over another surface maybe.
+    /// Forgets all: another search begins, maybe over another surface.
     pub(crate) fn clear(&mut self) {
         self.search = self.search.checked_add(1).unwrap_or_else(|| {
             self.entries.fill(Entry::default());
@@ -40,8 +40,8 @@ impl<End: Copy + Default> Trails<End> {
         });
     }
 
-    /// Where the last walk that came by a vertex has led, if its direction was much the same, and the cosine between
-    /// the two.
+    /// Where the last walk that passed a vertex led, if its direction was much the same, and the cosine between the
+    /// two.
     #[inline]
     pub(crate) fn find(&self, vertex: u32, direction: &Vec3) -> Option<(End, f64)> {
         let entry = self.entries.get(place(vertex))?;
@@ -75,7 +75,7 @@ fn rounded(direction: &Vec3) -> [f32; 3] {
     [direction.x, direction.y, direction.z].map(|x| x as f32)
 }
 
-/// Where the entry of a vertex lies: neighbours often have numbers that follow one another.
+/// Slot of the entry of a vertex: neighbours often have successive numbers.
 fn place(vertex: u32) -> usize {
     (vertex & ((1 << TRAILS_LOG) - 1)) as usize
 }

@@ -6,12 +6,12 @@ use crate::math::{Point, Vec3, f32_down, f32_up};
 
 /// Marks a leaf in [`Node::link`]; a mesh has fewer triangles than this.
 const LEAF: u32 = 1 << 31;
-/// Nodes that [`Tree::reach`] visits before it settles for the bound it has; a bumpy sphere of 10,000 triangles
-/// takes some 100 for the exact answer.
+/// Nodes that [`Tree::reach`] visits before it returns its current bound; a bumpy sphere of 10,000 triangles takes some
+/// 100 for the exact result.
 const REACH_NODES_MAX: usize = 512;
 
-/// Nodes that wait in a walk that goes depth first: one a level of a tree split at the median, and a mesh has under
-/// 2^31 triangles; or, of a mesh that deforms, seven a level of its tree of eight children a node, and the last eight.
+/// Most nodes that wait in a depth-first walk: one a level of a tree split at the median, and a mesh has under 2^31
+/// triangles; for a mesh that deforms, seven a level of its tree of eight children a node, and the last eight.
 pub(crate) const NODES_WAITING_MAX: usize = 64;
 
 const _: () = {
@@ -20,7 +20,7 @@ const _: () = {
     assert!(crate::limits::DEFORMING_TRIANGLES_MAX <= 1 << 21);
 };
 
-/// A box and what is in it. The left child of an inner node is the next node.
+/// A box and its contents. The left child of an inner node is the next node.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Node {
     /// Lower corner, relative to the tree's origin, metres.
@@ -33,11 +33,11 @@ pub(crate) struct Node {
 /// What is below a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Below {
-    /// One triangle, by its place in the mesh.
+    /// One triangle, by its index in the mesh.
     Triangle(u32),
-    /// Two nodes, by their places.
+    /// Two nodes, by their indices.
     Nodes(u32, u32),
-    /// Up to eight boxes of a mesh that deforms: the place of the first, and a bit for each that is there.
+    /// Up to eight boxes of a mesh that deforms: the index of the first, and a bit for each that exists.
     Row(u32, u8),
 }
 
@@ -51,7 +51,7 @@ impl Node {
         }
     }
 
-    /// What is below the node that stands at `place`.
+    /// What is below the node at index `place`.
     pub(crate) fn below(&self, place: u32) -> Below {
         if self.link & LEAF == 0 {
             Below::Nodes(place + 1, self.link)
@@ -112,7 +112,7 @@ impl Tree {
         Self { nodes, origin }
     }
 
-    /// No tree, of a mesh that has another.
+    /// No tree, for a mesh that has another kind.
     pub(crate) fn none(origin: Point) -> Self {
         Self {
             nodes: Vec::new(),
@@ -125,14 +125,14 @@ impl Tree {
         &self.nodes
     }
 
-    /// What the boxes are relative to, in the mesh's frame.
+    /// The origin of the boxes, in the mesh's frame.
     pub(crate) fn origin(&self) -> Point {
         self.origin
     }
 
-    /// An upper bound on `direction . (v - origin)` over all vertices; the greatest itself unless the mesh is unkind.
+    /// An upper bound on `direction . (v - origin)` over all vertices; usually the exact maximum.
     ///
-    /// Cost: at most `REACH_NODES_MAX` nodes, whatever the size of the mesh.
+    /// Cost: at most `REACH_NODES_MAX` nodes, regardless of the size of the mesh.
     pub(crate) fn reach(&self, vertices: &[Point], faces: &[[u32; 3]], direction: &Vec3) -> f64 {
         // Depth-first, the better child first: a stack of a balanced tree of 2^31 leaves fits.
         let mut stack = [(0u32, 0.0f64); 64];
@@ -155,7 +155,7 @@ impl Tree {
                         best = best.max(direction.dot(&(vertices[v as usize] - self.origin)));
                     }
                 }
-                // Of no such tree.
+                // Not a tree of this kind.
                 Below::Row(..) => {}
                 Below::Nodes(left, right) => {
                     let with = |i: u32| (i, self.nodes[i as usize].reach(direction));
@@ -173,13 +173,13 @@ impl Tree {
     }
 }
 
-/// Appends the subtree over `order` and returns nothing: its root is the node appended first.
+/// Appends the subtree over `order`: its root is the node appended first.
 fn build(nodes: &mut Vec<Node>, order: &mut [(u32, [f32; 3])], leaf: &dyn Fn(u32) -> Node) {
     if let [(face, _)] = order {
         nodes.push(leaf(*face));
         return;
     }
-    // Longest axis of the triangles' middles; all in one place still parts in two halves.
+    // Longest axis of the triangles' middles; if all coincide, they are still split into two halves.
     let mut low = [f32::INFINITY; 3];
     let mut high = [f32::NEG_INFINITY; 3];
     for (_, middle) in order.iter() {

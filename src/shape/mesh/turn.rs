@@ -1,9 +1,9 @@
-//! Shells that face inwards, turned round (law 3.3).
+//! Shells that face inwards are turned round (law 3.3).
 //!
-//! In: a solid's mesh and its shells with their volumes. Out: faces whose order of corners agrees with the solid meant.
+//! In: a solid's mesh and its shells with their volumes. Out: faces oriented as the solid is meant.
 //!
-//! Within another shell is also what touches it from within: a pocket that is flush with an outer face is a pocket,
-//! whichever way that face looks.
+//! A shell that touches another from within also counts as within it: a pocket that is flush with an outer face is a
+//! pocket, whichever way that face looks.
 
 use std::cell::Cell;
 
@@ -14,21 +14,21 @@ use super::tree::{Below, NODES_WAITING_MAX, Node, Tree};
 use super::{Inside, Mesh};
 use crate::math::{Point, Vec3};
 
-/// A shell of no more faces is asked face by face: a ray through the tree passes those of all other shells, too.
+/// A shell of no more faces is tested face by face: a ray through the tree visits those of all other shells, too.
 const FEW_FACES: usize = 64;
 
 impl Mesh {
-    /// Law 3.3: a shell of negative volume that is not wholly within another is turned round with all it holds.
+    /// Law 3.3: a shell of negative volume that is not wholly within another is turned round with all it contains.
     ///
-    /// Cost: nothing where no shell is negative. Else O(log n) for each shell; for one whose box lies within that of
-    /// another inside tests of its corners.
+    /// Cost: nothing if no shell is negative. Else O(log n) for each shell, plus inside tests of the corners of one
+    /// whose box lies within that of another.
     pub(super) fn turn_shells(&mut self, topology: &Topology) {
         let shells = &topology.shells;
         if shells.iter().all(|shell| shell.volume >= 0.0) {
             return;
         }
         let mut sign = vec![1.0; shells.len()];
-        // The largest first, so that what a turned shell holds is judged as turned.
+        // The largest first, so that the contents of a turned shell are judged as turned.
         let mut order: Vec<usize> = (0..shells.len()).collect();
         order.sort_by(|&a, &b| {
             let size = |i: usize| shells[i].volume.abs();
@@ -61,7 +61,7 @@ impl Mesh {
     }
 }
 
-/// Where a point is to a shell.
+/// A point's place relative to a shell.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Place {
     Outside,
@@ -69,15 +69,15 @@ enum Place {
     Inside,
 }
 
-/// Shells of a mesh, for questions of which lies within which.
+/// Shells of a mesh, to find which lies within which.
 struct Nest<'a> {
     mesh: &'a Mesh,
     shell_of: &'a [u32],
     shells: &'a [Shell],
-    /// Faces by shell, and where those of each begin.
+    /// Faces by shell, and the start of each shell's faces.
     faces: Vec<u32>,
     from: Vec<usize>,
-    /// Over the boxes of the shells.
+    /// A tree over the boxes of the shells.
     boxes: Tree,
 }
 
@@ -93,7 +93,7 @@ impl<'a> Nest<'a> {
         for shell in 0..shells.len() {
             from[shell + 1] += from[shell];
         }
-        // A box is that of a triangle between its corners.
+        // Each box is entered as a triangle between its corners.
         let corners: Vec<Point> = shells.iter().flat_map(|s| [s.low, s.high]).collect();
         let spans: Vec<[u32; 3]> = (0u32..)
             .zip(shells)
@@ -109,7 +109,7 @@ impl<'a> Nest<'a> {
         }
     }
 
-    /// Whether any other shell holds this one.
+    /// Whether any other shell contains this one.
     fn is_held(&self, inner: usize) -> bool {
         let (low, high) = self.bounds_of(inner);
         let mut around = Vec::new();
@@ -125,7 +125,7 @@ impl<'a> Nest<'a> {
             .any(|outer| self.holds(outer, inner, &corners))
     }
 
-    /// The shells that this one holds.
+    /// The shells that this one contains.
     fn held_by(&self, outer: usize) -> Vec<usize> {
         let (low, high) = self.bounds_of(outer);
         let mut held = Vec::new();
@@ -146,7 +146,7 @@ impl<'a> Nest<'a> {
 
     /// Whether shell `inner` lies wholly within shell `outer`: no vertex outside, and no vertex the other way.
     ///
-    /// Shells that pass through each other with edges alone are taken for held; no reading of them is right.
+    /// Shells that cross each other with edges alone count as contained; no interpretation of them is right.
     ///
     /// * `corners` - vertices of `inner`, each once.
     fn holds(&self, outer: usize, inner: usize, corners: &[u32]) -> bool {
@@ -161,7 +161,7 @@ impl<'a> Nest<'a> {
                 Place::Inside => inside = true,
             }
         }
-        // What touches with every corner fills a gap between two walls, or is a slot from wall to wall.
+        // A shell that touches with every corner fills a gap between two walls, or is a slot from wall to wall.
         let middle = || self.middle(inner);
         if !inside && !middle().is_some_and(|p| self.place(&p, outer) == Place::Inside) {
             return false;
@@ -200,7 +200,7 @@ impl<'a> Nest<'a> {
         }
     }
 
-    /// A point well within a shell: half of the way from the middle of its largest face to the next one.
+    /// A point well inside a shell: halfway from the middle of its largest face to the next one.
     fn middle(&self, shell: usize) -> Option<Point> {
         let faces = self.faces_of(shell);
         let area = |face: u32| {
@@ -239,7 +239,7 @@ impl<'a> Nest<'a> {
         let of = &self.shells[inner];
         let is_near = |p: &Point| (0..3).all(|k| of.low[k] <= p[k] && p[k] <= of.high[k]);
         let all = self.faces_of(outer);
-        // By the tree, unless more lies in that box than the one shell has.
+        // By the tree, unless that box contains more than the shell has.
         let (tree, mut near) = (&self.mesh.tree, Vec::new());
         let (low, high) = (of.low - tree.origin(), of.high - tree.origin());
         let whole = walk(tree, overlaps(low, high), all.len(), |face| {
@@ -276,7 +276,7 @@ fn overlaps(low: Vec3, high: Vec3) -> impl Fn(&Node) -> bool {
     }
 }
 
-/// Visits the triangles below nodes that pass; whether all were reached in so many steps.
+/// Visits the triangles below nodes that pass. Returns whether all were reached within the allowed steps.
 fn walk(
     tree: &Tree,
     passes: impl Fn(&Node) -> bool,
@@ -303,14 +303,14 @@ fn walk(
                 len += 2;
             }
             Below::Triangle(face) => visit(face),
-            // Of no such tree.
+            // Not a tree of this kind.
             Below::Row(..) => {}
         }
     }
     true
 }
 
-/// How far it is to a triangle along a unit direction, metres; `None`: the ray does not meet it ahead.
+/// Distance to a triangle along a unit direction, metres; `None`: the ray does not meet it ahead.
 ///
 /// Source: Möller and Trumbore 1997, "Fast, minimum storage ray/triangle intersection".
 fn way_to(from: &Point, along: &Vec3, [a, b, c]: &[Point; 3]) -> Option<f64> {

@@ -1,37 +1,37 @@
-//! Walks over the faces of a mesh: to where it reaches farthest, about a corner, to the place beneath a point.
+//! Walks over the faces of a mesh: to where it reaches farthest, around a corner, to the place beneath a point.
 //!
-//! In: a mesh with its neighbours, and a face to begin from. Out: vertices and places of the surface as far as it hangs
-//! together; nothing is said of what lies elsewhere.
+//! In: a mesh with its neighbours, and a face to begin from. Out: vertices and places of the connected surface; nothing
+//! is said of other parts.
 
 use super::Mesh;
 use super::adjacency::NONE;
 use super::trails::Trails;
 use crate::math::{Point, Vec3};
 
-/// Corners a climb goes over. A climb that needs more leads along a surface and not to a point of it.
+/// Most corners of a climb. A climb that needs more leads along a surface and not to a point of it.
 const HOPS_MAX: u32 = 48;
-/// Faces about one corner that are looked at.
+/// Most faces visited around one corner.
 const RING_MAX: u32 = 64;
-/// Faces that a walk over a surface passes.
+/// Most faces visited by a walk over a surface.
 const WALK_MAX: u32 = 48;
-/// Faces after which it is reckoned, once, how far a walk may yet come at the rate at which it has come so far.
+/// After this many faces a walk estimates, once, how far it may still get at its rate so far.
 const GLANCE: u32 = 8;
-/// A walk is given up where even so many times its rate so far would not bring it there in the faces left: two in three
+/// A walk is given up if even this multiple of its rate so far would not bring it there in the faces left: two in three
 /// end nowhere. With less, walks are given up that would arrive; with more, time goes into those that will not.
 const TOO_FAR: f64 = 1.5;
-/// Steps of a walk between two questions whether it is to go on: out of cold memory each takes half a microsecond.
+/// Steps of a walk between two calls of `go_on`: from cold memory each takes half a microsecond.
 const STEPS_PER_ASK: u32 = 4;
-/// A face that leans further from the direction of a walk (cosine) is not walked onto.
+/// A walk does not enter a face whose normal leans further from its direction (cosine).
 const LEAN: f64 = 0.3;
 /// The ends of an edge that lies across a direction differ in height by less than this share of the face's.
 const LEVEL: f64 = 1e-5;
-/// What is not told apart, as a share of the mesh's radius: far above rounding, far below any real edge.
+/// Resolution, as a share of the mesh's radius: far above rounding, far below any real edge.
 const SAME: f64 = 1e-10;
 
-/// Where a climb over a mesh has led from one of the vertices on its way.
+/// Where a climb over a mesh led from one of the vertices on its way.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Climb {
-    /// The vertex that it has come to.
+    /// The vertex it reached.
     vertex: u32,
     /// Corners on the way there, at least one.
     hops: u32,
@@ -39,12 +39,12 @@ pub(crate) struct Climb {
 
 impl Mesh {
     /// From the corner of a face that lies farthest along `direction` over the mesh's edges to one that no neighbour
-    /// lies beyond: a place where the surface, as far as it hangs together, reaches farthest.
+    /// lies beyond: a local maximum of the reach of the connected surface.
     ///
-    /// * `beyond_m` - a place that reaches farther, along `direction` from the origin, is of no interest.
-    /// * `trails` - of climbs over this mesh: where one came by, this one goes on from its end, if that is higher.
-    /// * `go_on` - asked every few corners. A climb that is left off goes on by its own trail when it is begun again.
-    /// * returns - the vertex; `None` where the climb leads beyond, does not end within 48 corners, or is left off.
+    /// * `beyond_m` - a place that reaches farther, along `direction` from the origin, does not matter.
+    /// * `trails` - of climbs over this mesh: if one passed here, this one continues from its end, if that is higher.
+    /// * `go_on` - called every few corners. A stopped climb continues by its own trail when it is started again.
+    /// * returns - the vertex; `None` if the climb leads beyond, does not end within 48 corners, or is stopped.
     pub(crate) fn climb(
         &self,
         face: u32,
@@ -57,7 +57,7 @@ impl Mesh {
         let corners = self.faces[face as usize].map(|vertex| (height(vertex), vertex));
         let higher = |x: (f64, u32), y: (f64, u32)| if y.0 > x.0 { y } else { x };
         let mut best = corners.into_iter().fold(corners[0], higher);
-        // Vertices passed, each with the corners up to it.
+        // Vertices visited, each with the number of corners up to it.
         let (mut path, mut len) = ([(0, 0); HOPS_MAX as usize], 0);
         let mut hops = 0;
         let top = loop {
@@ -98,8 +98,8 @@ impl Mesh {
         top
     }
 
-    /// The height of the edge of a face that lies across `direction` on top of it, if neither of the two faces at it
-    /// reaches higher: then it is the surface's edge too, whatever lies further on.
+    /// The height of a face's edge that lies across `direction` at its top, if neither of its two faces reaches higher:
+    /// then it is an edge of the surface too, whatever lies further on.
     pub(crate) fn crest(&self, face: u32, direction: &Vec3) -> Option<f64> {
         let on = |v: u32| direction.dot(&self.vertices[v as usize].coords);
         let [a, b, c] = self.faces[face as usize].map(on);
@@ -127,9 +127,9 @@ impl Mesh {
         (on(opposite) <= top + SAME * self.radius).then_some(top)
     }
 
-    /// Visits the faces about the corners of a face, some more than once.
+    /// Visits the faces around the corners of a face, some more than once.
     ///
-    /// * returns - whether these are all: about each corner they close to a ring that is not cut.
+    /// * returns - whether these are all: around each corner they close to a complete ring.
     pub(super) fn about(&self, face: u32, mut visit: impl FnMut(u32)) -> bool {
         let round = |side| self.go_round(side, |other| visit(other / 3)).is_some();
         (3 * face..3 * face + 3)
@@ -137,23 +137,23 @@ impl Mesh {
             .fold(true, |all, closed| all & closed)
     }
 
-    /// Visits the corners of all faces about the start of a side, as sides that start there: each at the first face
+    /// Visits the corners of all faces around the start of a side, as sides that start there: each at the first face
     /// that has it.
     ///
-    /// * returns - how many faces there are, where they close to a ring of no more than 64.
+    /// * returns - number of faces, if they close to a ring of no more than 64.
     pub(super) fn go_round(&self, side: u32, mut visit: impl FnMut(u32)) -> Option<u32> {
         let (face, k) = (side / 3, side % 3);
         let start = self.start_of(side);
         let at = self.vertices[start as usize];
         visit(3 * face + (k + 1) % 3);
         visit(3 * face + (k + 2) % 3);
-        // One way round; from a border once more the other way.
+        // One way round; from a border again the other way.
         for mut leave in [3 * face + (k + 2) % 3, side] {
             for faces in 1..=RING_MAX {
                 let entry = self.adjacency.twins()[leave as usize];
                 if entry == NONE {
-                    // Over a seam the corner may be none of the faces beyond: those beside them are looked at, too,
-                    // else a walk along a side that lies level ends there.
+                    // Over a seam the faces beyond may not have the corner: their neighbours are visited, too, or a
+                    // walk along a level side would end there.
                     for other in self.adjacency.beyond(leave) {
                         for side in 3 * other..3 * other + 3 {
                             visit(side);
@@ -171,21 +171,21 @@ impl Mesh {
                     return Some(faces);
                 }
                 let corners = self.faces[next as usize];
-                // Without a branch on which corner it is: that is as good as random.
+                // Branch-free: which corner it is is practically random.
                 let same = corners.map(|v| u32::from(v == start));
                 let mut j = same[1] | same[2] << 1;
                 if same == [0; 3] {
-                    // Another vertex at the same place.
+                    // A different vertex at the same place.
                     let there = |&j: &u32| self.vertices[corners[j as usize] as usize] == at;
                     let Some(other) = (0..3).find(there) else {
                         break;
                     };
                     j = other;
                 }
-                // Of a face that has it twice the first.
+                // If a face has it twice, the first.
                 j = if same[0] == 1 { 0 } else { j.min(2) };
-                // Out by the other side at this corner, whichever way the face is turned. The side that was come in by
-                // has been seen, and so has its other end.
+                // Leave by the other side at this corner, whichever way the face is turned. The side of entry has been
+                // seen, and so has its other end.
                 let (beside, opposite) = (3 * next + (j + 1) % 3, 3 * next + (j + 2) % 3);
                 leave = if entry == 3 * next + j {
                     visit(opposite);
@@ -199,12 +199,12 @@ impl Mesh {
         None
     }
 
-    /// The place of the surface that a point lies over, looking along `direction`: from `face` on, over its neighbours.
+    /// The place of the surface beneath a point, along `direction`: from `face` on, over its neighbours.
     ///
-    /// * `direction` - unit, outward where the mesh is a solid.
-    /// * `go_on` - asked every few faces.
-    /// * returns - the place, and its face; `None` where the surface ends or turns away on the way there, it is more
-    ///   than 48 faces off, or the walk is left off.
+    /// * `direction` - unit, outward if the mesh is a solid.
+    /// * `go_on` - called every few faces.
+    /// * returns - the place, and its face; `None` if the surface ends or turns away on the way there, it is more than
+    ///   48 faces off, or the walk is stopped.
     pub(crate) fn beneath(
         &self,
         mut face: u32,
@@ -243,7 +243,7 @@ impl Mesh {
             }
             let entry = self.adjacency.twins()[(3 * face + k) as usize];
             face = if entry == NONE {
-                // Of several faces beyond a seam the one that is nearest to being over the point.
+                // Of several faces beyond a seam, the one that is closest to being beneath the point.
                 let over = |other: &u32| self.off(*other, point, direction);
                 let beyond = self.adjacency.beyond(3 * face + k);
                 beyond.min_by(|x, y| over(x).total_cmp(&over(y)))?
@@ -254,7 +254,7 @@ impl Mesh {
         None
     }
 
-    /// How far a point lies off a face, looking along `direction`, metres.
+    /// How far a point lies outside a face, seen along `direction`, metres.
     fn off(&self, face: u32, point: &Point, direction: &Vec3) -> f64 {
         let sign = self
             .face_normal(face)
@@ -263,7 +263,7 @@ impl Mesh {
     }
 }
 
-/// The side of a face that a point lies farthest beyond, looking along `direction`, and how far, metres.
+/// The side of a face beyond which a point lies farthest, seen along `direction`, and how far, metres.
 ///
 /// * `sign` - of the face's normal along `direction`.
 fn farthest_side(corners: &[Point; 3], point: &Point, direction: &Vec3, sign: f64) -> (u32, f64) {

@@ -1,32 +1,31 @@
-//! What a box may do without any work, to reckon with and as it is kept.
+//! The range in which a box may move without any work, in computing and in storage form.
 
 use super::lanes::Down;
 
-/// What a box may do without any work: it stays inside `fat` and goes on holding `core`.
+/// The range in which a box may move without any work: it stays inside `fat` and still contains `core`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hold {
-    /// Holds the box; its spare lanes are minus infinity.
+    /// Contains the box; its spare lanes are minus infinity.
     pub(crate) fat: Down,
-    /// Is held by the box; infinite, also in its spare lanes: no box fails it.
+    /// Lies in the box; infinite, also in its spare lanes: no box fails it.
     pub(crate) core: Down,
 }
 
 impl Hold {
-    /// Of no box: nothing keeps to it.
+    /// The hold of no box: nothing keeps to it.
     pub(crate) const EMPTY: Self = Self {
         fat: Down::EMPTY,
         core: Down::EMPTY,
     };
 
-    /// Whether it is of no box.
+    /// Whether it belongs to no box.
     #[inline(always)]
     pub(crate) fn is_lost(&self) -> bool {
         self.fat.faces[0].is_nan()
     }
 }
 
-/// A hold as it is kept: without the spare lanes, which say nothing and would be a quarter of what is read of each
-/// body.
+/// A stored hold: without the spare lanes, which carry no information and would be a quarter of what is read per body.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub(crate) struct Held {
@@ -37,7 +36,7 @@ pub(crate) struct Held {
 const _: () = assert!(size_of::<Held>() == 48);
 
 impl Held {
-    /// Of no box: nothing keeps to it.
+    /// The hold of no box: nothing keeps to it.
     pub(crate) const EMPTY: Self = Self::of(&Hold::EMPTY);
 
     #[inline(always)]
@@ -49,7 +48,7 @@ impl Held {
         }
     }
 
-    /// To reckon with.
+    /// Converts to the computing form.
     #[inline(always)]
     pub(crate) fn hold(&self) -> Hold {
         let [x, y, z, u, v, w, r, s, t, l, m, n] = self.faces;

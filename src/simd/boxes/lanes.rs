@@ -1,16 +1,16 @@
-//! Sixteen boxes as a structure of arrays, what can be asked of them, and the safe twin of every kernel.
+//! Sixteen boxes as a structure of arrays, the queries on them, and the safe twin of every kernel.
 
 use super::hold::Held;
 
 /// Boxes in a block.
 pub(crate) const WIDTH: usize = 16;
-/// The same, to reckon with ranks.
+/// The same, for arithmetic with ranks.
 pub(crate) const LANES: u32 = 16;
 
 const _: () = assert!(LANES as usize == WIDTH);
 
-/// Sixteen boxes: lower x, y, z, then upper x, y, z, each for sixteen lanes. A lane without a box holds NaN: it meets
-/// nothing, and no bound grows by it.
+/// Sixteen boxes: lower x, y, z, then upper x, y, z, each for sixteen lanes. A lane without a box contains NaN: it
+/// meets nothing, and no bound grows by it.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Boxes16 {
@@ -40,7 +40,7 @@ impl Boxes16 {
 }
 
 /// One box, every face as a number that rounding and widening make smaller: lower x, y, z, a spare, minus upper x, y,
-/// z, a spare. So outward is downward on each lane, and `a` holds `b` where no lane of `a` is above that of `b`.
+/// z, a spare. So outward is downward on each lane, and `a` contains `b` if no lane of `a` is above that of `b`.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub(crate) struct Down {
@@ -50,12 +50,11 @@ pub(crate) struct Down {
 
 /// The first spare lane of a [`Down`]; the other is four further.
 pub(crate) const SPARE: usize = 3;
-/// What stands in the spare lanes of a box: two of them overlap there for sure, so that no kernel needs to leave the
-/// lanes out.
+/// The value of the spare lanes of a box: two of them surely overlap there, so that no kernel needs to mask the lanes.
 const SPARE_FACE: f32 = -1.0 - f32::EPSILON;
 
 impl Down {
-    /// No box: it holds nothing, meets nothing.
+    /// No box: it contains nothing, meets nothing.
     pub(crate) const EMPTY: Self = Self {
         faces: [f32::NAN; 8],
     };
@@ -90,7 +89,7 @@ impl Down {
         }
     }
 
-    /// As an outer box: its spare lanes hold whatever stands in another's.
+    /// As an outer box: its spare lanes contain any value.
     #[inline(always)]
     pub(crate) fn open(mut self) -> Self {
         self.faces[SPARE] = f32::NEG_INFINITY;
@@ -98,7 +97,7 @@ impl Down {
         self
     }
 
-    /// The mean of its three sides; not finite where the box is not.
+    /// The mean of its three sides; not finite if the box is not.
     #[inline(always)]
     pub(crate) fn mean_side(&self) -> f32 {
         let f = &self.faces;
@@ -107,29 +106,29 @@ impl Down {
     }
 }
 
-/// How much more than the rounding of a face tells two boxes surely overlap: rounding takes 2^-22 of a face's distance
-/// from the origin at most, on either side.
+/// Slack beyond the rounding of a face that proves an overlap of two boxes: rounding takes at most 2^-22 of a face's
+/// distance from the origin, on either side.
 pub(super) const SLACK_SHARE: f32 = 1.0 / 1_048_576.0;
-/// Slack of a face besides [`SLACK_SHARE`], metres: for what is rounded below the normal range.
+/// Slack of a face in addition to [`SLACK_SHARE`], metres: for rounding below the normal range.
 pub(super) const SLACK_LEAST: f32 = 8.0 * LEAST;
-/// What is taken off a face that was rounded to nearest, as a share of it: a step of an f32 or up to two, where
-/// rounding moved it by half a step at most.
+/// Subtracted from a face that was rounded to nearest, as a share of it: a step of an f32 or up to two, while rounding
+/// moved it by half a step at most.
 pub(super) const STEP: f32 = f32::EPSILON;
-/// What is taken off besides: below the normal range a step is less than the least normal number.
+/// Also subtracted: below the normal range a step is less than the least normal number.
 pub(super) const LEAST: f32 = f32::MIN_POSITIVE;
 
-/// The slack of a face that is this far from the origin.
+/// The slack of a face at this distance from the origin.
 #[inline(always)]
 pub(crate) fn slack(far: f32) -> f32 {
     far * SLACK_SHARE + SLACK_LEAST
 }
 
-/// What can be asked of sixteen boxes at once, and of single ones.
+/// Queries on sixteen boxes at once, and on single ones.
 pub(crate) trait Lanes: Copy {
     /// Lanes whose closed box shares a point with `one`.
     fn meets(self, block: &Boxes16, one: &[f32; 6]) -> u16;
 
-    /// The least box around some lanes; upside down (`+inf`, `-inf`) where all of them are empty.
+    /// The least box around the chosen lanes; inverted (`+inf`, `-inf`) if all of them are empty.
     fn bound(self, block: &Boxes16, chosen: u16) -> [f32; 6];
 
     /// A box rounded outward to f32, relative to an origin.
@@ -137,7 +136,7 @@ pub(crate) trait Lanes: Copy {
     /// * `min`, `max` - up to 1e38 in magnitude, or infinite outward.
     fn outward(self, min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> Down;
 
-    /// As `outward`, written to a place; returns whether the box keeps to a hold, as `holds` tells.
+    /// As `outward`, written to `place`; returns whether the box keeps to a hold, as `holds` does.
     fn take(
         self,
         corners: [&[f64; 3]; 2],
@@ -146,17 +145,16 @@ pub(crate) trait Lanes: Copy {
         place: &mut Down,
     ) -> bool;
 
-    /// Whether a box keeps to a hold, rounded to nearest: where it does, the box rounded outward lies in a fat box that
-    /// is wider by a step of each face and `LEAST`, and holds the core.
+    /// Whether a box, rounded to nearest, keeps to a hold: if so, the box rounded outward lies in a fat box that is
+    /// wider by a step of each face and `LEAST`, and contains the core.
     fn keeps(self, corners: [&[f64; 3]; 2], origin: &[f64; 3], held: &Held) -> bool;
 
-    /// Whether two boxes are surely apart, and whether they surely overlap: at every face by the slack of that of `a`
-    /// at least. That is enough for both: a face of `b` that is much farther out than that of `a` was rounded by no
-    /// more than a small share of how far the boxes overlap there.
+    /// Whether two boxes are surely apart, and whether they surely overlap: at every face by at least the slack of that
+    /// of `a`. That is enough for both: a face of `b` that is much farther out than that of `a` was rounded by no more
+    /// than a small share of the overlap there.
     fn parts(self, a: &Down, b: &Down) -> (bool, bool);
 
-    /// Whether `inner` lies inside `outer`. The spare lanes are compared too: those of `outer` are to be minus
-    /// infinity.
+    /// Whether `inner` lies inside `outer`. The spare lanes are compared too: those of `outer` must be minus infinity.
     fn holds(self, outer: &Down, inner: &Down) -> bool;
 
     /// Bit `lane` of each row of a matrix of bits, as the bits of those rows.
@@ -165,8 +163,8 @@ pub(crate) trait Lanes: Copy {
     /// A matrix with all bits in some rows.
     fn spread(self, rows: u16) -> [u16; WIDTH];
 
-    /// Writes the numbers of some lanes, the first lane being `first`, ascending to the front of a place; what stands
-    /// behind them then is anything.
+    /// Writes the numbers of the given lanes, the first lane being `first`, ascending to the front of `place`; the
+    /// values behind them are arbitrary.
     fn number(self, lanes: u16, first: u32, place: &mut [u32; WIDTH]);
 }
 
@@ -174,7 +172,7 @@ pub(crate) trait Lanes: Copy {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Portable;
 
-/// Sixteen answers as bits.
+/// Sixteen flags as bits.
 #[inline(always)]
 fn mask(answers: &[bool; WIDTH]) -> u16 {
     let mut bits = 0;
@@ -200,7 +198,7 @@ impl Lanes for Portable {
     fn meets(self, block: &Boxes16, one: &[f32; 6]) -> u16 {
         let f = &block.faces;
         let answers = std::array::from_fn(|i| {
-            // What is NaN parts nobody on a lower face, and meets nobody on an upper one.
+            // NaN never separates on a lower face, and never meets on an upper one.
             let parted = (one[3] < f[0][i]) | (one[4] < f[1][i]) | (one[5] < f[2][i]);
             !parted & (one[0] <= f[3][i]) & (one[1] <= f[4][i]) & (one[2] <= f[5][i])
         });
@@ -211,7 +209,7 @@ impl Lanes for Portable {
     fn bound(self, block: &Boxes16, chosen: u16) -> [f32; 6] {
         let mut bound = [f32::NEG_INFINITY; 6];
         for (k, face) in block.faces.iter().enumerate() {
-            // Lower faces turned round, so that one rule serves both.
+            // Lower faces negated, so that one rule serves both.
             let sign = if k < 3 { -1.0 } else { 1.0 };
             for (lane, value) in face.iter().enumerate() {
                 let value = sign * value;
@@ -272,7 +270,7 @@ impl Lanes for Portable {
         let (a, b) = (&a.faces, &b.faces);
         let (mut apart, mut sure) = (false, true);
         for k in 0..8 {
-            // Lower face of the one minus upper face of the other: above zero where they are apart.
+            // Lower face of one minus upper face of the other: positive if they are apart.
             let gap = a[k] + b[(k + 4) % 8];
             apart |= gap > 0.0;
             sure &= gap <= -slack(a[k].abs());
@@ -303,7 +301,7 @@ impl Lanes for Portable {
     fn number(self, lanes: u16, first: u32, place: &mut [u32; WIDTH]) {
         let mut at = 0;
         for (lane, number) in (first..).take(WIDTH).enumerate() {
-            // Written over where the lane is not meant: no branch is taken on it.
+            // Overwritten if the lane is not selected: no branch is needed.
             place[at % WIDTH] = number;
             at += usize::from(lanes >> lane & 1);
         }

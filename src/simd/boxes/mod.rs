@@ -1,16 +1,16 @@
 //! Kernels over sixteen boxes at a time.
 //!
 //! In: blocks of sixteen boxes as a structure of arrays (`Boxes16`), single boxes (`Down`). Out: masks of sixteen bits,
-//! one a lane or a row, and plain answers. `Portable` is the safe twin in plain Rust; every other set of `Lanes` gives
-//! the same bits, which tests compare. Which one runs is decided once, by what the processor says (`Level::best`).
+//! one per lane or row, and plain results. `Portable` is the safe twin in plain Rust; every other set of `Lanes` gives
+//! the same bits, which tests compare. The level is chosen once, by the processor's features (`Level::best`).
 //!
-//! How: a caller writes its loop once as a `Work`, generic over `Lanes`, all of it `#[inline(always)]`;
-//! `Level::run` compiles it once a level inside a function that has the level's instructions switched on, so that
-//! the whole loop, not only a kernel, is built for them. AVX2 is the main path, AVX-512 halves its instructions. On
-//! aarch64 NEON is part of every target, and the compiler builds the twin with it.
+//! How: a caller writes its loop once as a `Work`, generic over `Lanes`, all of it `#[inline(always)]`; `Level::run`
+//! compiles it once per level inside a function with the level's instructions enabled, so that the whole loop, not only
+//! a kernel, is built for them. AVX2 is the main path, AVX-512 halves its instructions. On aarch64 NEON is part of
+//! every target, and the compiler builds the twin with it.
 //!
-//! Why `std::arch` and not a crate: four kernels need a compare that ends in a mask of bits, which no portable layer
-//! gives without a detour on AVX2; everything else here the compiler turns into vector code by itself.
+//! Why `std::arch` and not a crate: four kernels need a compare that ends in a bit mask, which no portable layer gives
+//! without a detour on AVX2; everything else here the compiler vectorises by itself.
 
 #![allow(
     unsafe_code,
@@ -27,9 +27,9 @@ pub(crate) use lanes::{Boxes16, Down, LANES, Lanes, Portable, SPARE, WIDTH, slac
 
 /// A loop that is built once for each set of lanes.
 pub(crate) trait Work {
-    /// What it yields.
+    /// Its result type.
     type Out;
-    /// Runs it. To be marked `#[inline(always)]`, like what it calls in its hot part.
+    /// Runs it. Mark it `#[inline(always)]`, like what it calls in its hot part.
     fn run<L: Lanes>(self, lanes: L) -> Self::Out;
 }
 
@@ -48,23 +48,23 @@ impl Level {
     /// Every level, the best last.
     const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
 
-    /// The best that this processor has.
+    /// The best level of this processor.
     #[must_use]
     pub fn best() -> Self {
         Self::Avx512.checked()
     }
 
-    /// Every level that this processor has, the best last.
+    /// Every level of this processor, the best last.
     #[must_use]
     pub fn available() -> Vec<Self> {
         let all = Self::ALL.into_iter();
         all.filter(|level| level.checked() == *level).collect()
     }
 
-    /// Runs a loop with these instructions; those that the processor lacks are never used.
+    /// Runs a loop with these instructions; any that the processor lacks are never used.
     pub(crate) fn run<W: Work>(self, work: W) -> W::Out {
         match self.checked() {
-            // SAFETY: `checked` has asked the processor for each feature that the function is built with.
+            // SAFETY: `checked` has tested that the processor has each feature that the function is built with.
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => unsafe { x86::run_avx512(work) },
             // SAFETY: as above.
@@ -74,8 +74,8 @@ impl Level {
         }
     }
 
-    /// The level itself where the processor has it, else the best it has: a level can be written down by anyone. The
-    /// standard library keeps what the processor answered in one word; asking costs a load.
+    /// The level itself if the processor has it, else the best it has: anyone can name a level. The standard library
+    /// caches the processor's features in one word; testing them costs a load.
     fn checked(self) -> Self {
         #[cfg(target_arch = "x86_64")]
         {
@@ -98,8 +98,7 @@ impl Level {
     }
 }
 
-/// Asks for what lies at a place to be brought near: what a loop reads a few steps later. A hint, without effect on
-/// what is computed.
+/// Prefetches what a loop reads a few steps later. A hint, without effect on results.
 #[inline(always)]
 pub(crate) fn prefetch<T>(place: &T) {
     #[cfg(target_arch = "x86_64")]
@@ -110,8 +109,8 @@ pub(crate) fn prefetch<T>(place: &T) {
             // SAFETY: a prefetch faults on no address, and this one lies inside `place`; SSE is part of x86-64.
             unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(at)) };
         }
-        // What is not laid along the lines of the cache ends in another one half of the time, but for what is no longer
-        // than its alignment.
+        // Data that is not aligned to cache lines ends in a further line half of the time, unless it is no longer than
+        // its alignment.
         if align_of::<T>() < 64 && size_of::<T>() > align_of::<T>() {
             // SAFETY: as above.
             unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(size_of::<T>() - 1)) };

@@ -1,4 +1,4 @@
-//! Every level gives the bits of the safe twin, on boxes that touch, miss by one step, hold nothing, are infinite.
+//! Every level gives the bits of the safe twin, on boxes that touch, miss by one step, are empty, or are infinite.
 
 #![allow(clippy::float_cmp, reason = "the same numbers, not near ones")]
 
@@ -6,7 +6,7 @@ mod keeps;
 
 use super::*;
 
-/// Asks one block everything and notes the answers.
+/// Runs all kernels on one block and records the results.
 struct Everything<'a>(&'a Boxes16, &'a [f32; 6], &'a Down, &'a Down);
 
 impl Work for Everything<'_> {
@@ -23,7 +23,7 @@ impl Work for Everything<'_> {
     }
 }
 
-/// A small generator of its own: the room names no other.
+/// A small generator of its own: this room imports no other.
 fn next(state: &mut u64) -> u64 {
     *state = state
         .wrapping_mul(6_364_136_223_846_793_005)
@@ -56,7 +56,7 @@ fn block(state: &mut u64) -> Boxes16 {
 
 #[test]
 fn every_level_gives_the_bits_of_the_safe_twin() {
-    // Miri runs the twin alone; a few rounds show it sound.
+    // Miri runs only the twin; a few rounds show that it is sound.
     let rounds = if cfg!(miri) { 20 } else { 20_000 };
     for seed in 0..rounds {
         let state = &mut (seed + 1);
@@ -160,7 +160,7 @@ fn every_level_numbers_the_lanes_that_are_meant_in_their_order() {
 /// The lanes of a `Down` that are not spare.
 const FACES: [usize; 6] = [0, 1, 2, 4, 5, 6];
 
-/// Takes a box and tells whether it keeps to a hold.
+/// Takes a box and returns whether it keeps to a hold.
 struct Taken<'a>([&'a [f64; 3]; 2], &'a [f64; 3], &'a Held);
 
 impl Work for Taken<'_> {
@@ -267,7 +267,7 @@ fn every_level_rounds_boxes_outward_to_the_same_bits() {
     }
 }
 
-/// Asks whether two boxes are apart.
+/// Tests whether two boxes are apart.
 struct Parted<'a>(&'a Down, &'a Down);
 
 impl Work for Parted<'_> {
@@ -287,7 +287,7 @@ fn what_is_told_of_rounded_boxes_is_true_of_the_boxes() {
         let state = &mut (seed + 1);
         let at = |state: &mut u64, below: usize| usize::try_from(next(state)).unwrap() % below;
         let mut one_of = |some: &[f64]| some[at(state, some.len())];
-        // Two boxes that touch at a face on one axis, but for a little; far out or not, of any size.
+        // Two boxes that nearly touch at a face on one axis; far out or not, of any size.
         let (far, far_too) = (
             one_of(&[0.0, 1e-30, 1.0, 1e7]),
             one_of(&[0.0, 1e-40, 3.0, -1e9]),

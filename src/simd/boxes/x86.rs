@@ -1,5 +1,5 @@
 //! The kernels in AVX2 and AVX-512. Only sums, products, compares and maxima, in the order of the twin, so that every
-//! bit is the twin's.
+//! bit equals the twin's.
 
 mod hold;
 mod number;
@@ -26,8 +26,8 @@ use super::lanes::{Boxes16, Down, LEAST, Lanes, SLACK_LEAST, SLACK_SHARE, STEP, 
 use hold::{keeps_avx2, take_avx2};
 use number::{number_avx2, number_avx512};
 
-/// Two halves of eight lanes or, where `WIDE`, sixteen at once for what gains by it. Only [`run_avx2`] and
-/// [`run_avx512`] make one: where one is, AVX2 is, and where a wide one is, AVX-512 F, BW, DQ and VL are too.
+/// Two halves of eight lanes or, if `WIDE`, sixteen at once where that is faster. Only [`run_avx2`] and [`run_avx512`]
+/// make one: so the processor has AVX2, and for a wide one also AVX-512 F, BW, DQ and VL.
 #[derive(Clone, Copy)]
 struct Vectors<const WIDE: bool>(());
 
@@ -58,8 +58,8 @@ fn all(face: &[f32; WIDTH]) -> __m512 {
     unsafe { _mm512_loadu_ps(face.as_ptr()) }
 }
 
-/// The sign bits of eight lanes. By its own instruction: what the compiler makes of two such masks put together, or of
-/// one that is compared with all ones where AVX-512 is (by a mask register), is nearly twice as long.
+/// The sign bits of eight lanes. By its own instruction: compiled code for two such masks combined, or for one that is
+/// compared with all ones with AVX-512 (by a mask register), is nearly twice as long.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn sign_bits(lanes: __m256) -> u32 {
@@ -91,8 +91,8 @@ fn bits(low: __m256, high: __m256) -> u16 {
 #[target_feature(enable = "avx2")]
 fn meets_half(block: &Boxes16, one: &[f32; 6], at: usize) -> __m256 {
     let f = &block.faces;
-    // `one[k + 3] < face[k]` parts them, `one[k] <= face[k + 3]` does not: the face is the second operand of both,
-    // which alone may stand in memory.
+    // `one[k + 3] < face[k]` means apart, `one[k] <= face[k + 3]` means not: the face is the second operand of both,
+    // the only one that may be in memory.
     let parted =
         |k: usize| _mm256_cmp_ps::<_CMP_LT_OQ>(_mm256_set1_ps(one[k + 3]), half(&f[k], at));
     let high = |k: usize| _mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_set1_ps(one[k]), half(&f[k + 3], at));
@@ -113,7 +113,7 @@ fn meets_avx2(block: &Boxes16, one: &[f32; 6]) -> u16 {
 #[target_feature(enable = "avx512f")]
 fn meets_avx512(block: &Boxes16, one: &[f32; 6]) -> u16 {
     let f = &block.faces;
-    // Each compare within the lanes that another left, which takes no instruction more; in two chains of three.
+    // Each compare within the lanes left by another, which takes no further instruction; in two chains of three.
     let low = |left, k: usize| {
         _mm512_mask_cmp_ps_mask::<_CMP_NLT_UQ>(left, _mm512_set1_ps(one[k + 3]), all(&f[k]))
     };
@@ -172,7 +172,7 @@ fn store(faces: __m256, place: &mut Down) {
 #[target_feature(enable = "avx2")]
 fn parts_avx2(a: &Down, b: &Down) -> (bool, bool) {
     let (a, b) = (one(a), one(b));
-    // The halves of `b` change places: lower faces meet upper ones.
+    // Swap the halves of `b`: lower faces meet upper ones.
     let gap = _mm256_add_ps(a, _mm256_permute2f128_ps::<1>(b, b));
     let far_down = _mm256_or_ps(a, _mm256_set1_ps(-0.0));
     let least = _mm256_sub_ps(
@@ -205,7 +205,7 @@ fn rows(matrix: &[u16; WIDTH]) -> __m256i {
     reason = "a place below sixteen; eight bits above eight bits"
 )]
 fn column_avx2(matrix: &[u16; WIDTH], lane: usize) -> u16 {
-    // The bit to the top of its row, which packing to bytes keeps as the sign.
+    // Shift the bit to the top of its row, which packing to bytes keeps as the sign.
     let up = _mm_cvtsi32_si128((WIDTH - 1 - lane % WIDTH) as i32);
     let top = _mm256_sll_epi16(rows(matrix), up);
     let bytes = _mm256_packs_epi16(top, _mm256_setzero_si256());
@@ -220,7 +220,7 @@ fn column_avx512(matrix: &[u16; WIDTH], lane: usize) -> u16 {
     _mm256_test_epi16_mask(rows(matrix), _mm256_set1_epi16(bit))
 }
 
-/// By its own instructions: the compiler treats the row whose bit is the sign apart, and takes four times as many.
+/// By its own instructions: the compiler handles the row of the sign bit separately, and takes four times as many.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn spread_avx2(rows: u16) -> [u16; WIDTH] {
@@ -248,12 +248,12 @@ fn lines(all: __m256i) -> [u16; WIDTH] {
     matrix
 }
 
-/// The greatest of the chosen lanes; minus infinity where there is none. `set` is all ones in those lanes.
+/// The greatest of the chosen lanes; minus infinity if there is none. `set` is all ones in those lanes.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn greatest(low: __m256, high: __m256, set: [__m256; 2]) -> f32 {
     let none = _mm256_set1_ps(f32::NEG_INFINITY);
-    // A maximum with NaN first yields the second: empty lanes fall away.
+    // A maximum with NaN as the first operand returns the second: empty lanes drop out.
     let low = _mm256_max_ps(_mm256_blendv_ps(none, low, set[0]), none);
     let high = _mm256_max_ps(_mm256_blendv_ps(none, high, set[1]), none);
     let eight = _mm256_max_ps(low, high);
@@ -268,7 +268,7 @@ fn greatest(low: __m256, high: __m256, set: [__m256; 2]) -> f32 {
 #[inline]
 #[target_feature(enable = "avx2")]
 fn bound_avx2(block: &Boxes16, chosen: u16) -> [f32; 6] {
-    // Bit k of the mask to all of lane k.
+    // Spread bit k of the mask to all of lane k.
     let bits = _mm256_set1_epi32(i32::from(chosen));
     let places = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
     let set = |bits, places| {
@@ -292,24 +292,24 @@ impl<const WIDE: bool> Lanes for Vectors<WIDE> {
     #[inline(always)]
     fn meets(self, block: &Boxes16, one: &[f32; 6]) -> u16 {
         if WIDE {
-            // SAFETY: a wide one is made only where AVX-512 F is.
+            // SAFETY: a wide one is made only if AVX-512 F is available.
             unsafe { meets_avx512(block, one) }
         } else {
-            // SAFETY: a `Vectors` is made only where AVX2 is.
+            // SAFETY: a `Vectors` is made only if AVX2 is available.
             unsafe { meets_avx2(block, one) }
         }
     }
 
     #[inline(always)]
     fn bound(self, block: &Boxes16, chosen: u16) -> [f32; 6] {
-        // SAFETY: a `Vectors` is made only where AVX2 is.
+        // SAFETY: a `Vectors` is made only if AVX2 is available.
         unsafe { bound_avx2(block, chosen) }
     }
 
     #[inline(always)]
     fn outward(self, min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> Down {
         let mut down = Down { faces: [0.0; 8] };
-        // SAFETY: a `Vectors` is made only where AVX2 is.
+        // SAFETY: a `Vectors` is made only if AVX2 is available.
         unsafe { store(outward_avx2(min, max, origin), &mut down) };
         down
     }
@@ -322,35 +322,35 @@ impl<const WIDE: bool> Lanes for Vectors<WIDE> {
         held: &Held,
         place: &mut Down,
     ) -> bool {
-        // SAFETY: a `Vectors` is made only where AVX2 is.
+        // SAFETY: a `Vectors` is made only if AVX2 is available.
         unsafe { take_avx2(corners, origin, held, place) }
     }
 
     #[inline(always)]
     fn keeps(self, corners: [&[f64; 3]; 2], origin: &[f64; 3], held: &Held) -> bool {
-        // SAFETY: a `Vectors` is made only where AVX2 is.
+        // SAFETY: a `Vectors` is made only if AVX2 is available.
         unsafe { keeps_avx2(corners, origin, held) }
     }
 
     #[inline(always)]
     fn parts(self, a: &Down, b: &Down) -> (bool, bool) {
-        // SAFETY: a `Vectors` is made only where AVX2 is.
+        // SAFETY: a `Vectors` is made only if AVX2 is available.
         unsafe { parts_avx2(a, b) }
     }
 
     #[inline(always)]
     fn holds(self, outer: &Down, inner: &Down) -> bool {
-        // SAFETY: a `Vectors` is made only where AVX2 is.
+        // SAFETY: a `Vectors` is made only if AVX2 is available.
         unsafe { holds_avx2(outer, inner) }
     }
 
     #[inline(always)]
     fn column(self, matrix: &[u16; WIDTH], lane: usize) -> u16 {
         if WIDE {
-            // SAFETY: a wide one is made only where AVX-512 BW and VL are.
+            // SAFETY: a wide one is made only if AVX-512 BW and VL are available.
             unsafe { column_avx512(matrix, lane) }
         } else {
-            // SAFETY: a `Vectors` is made only where AVX2 is.
+            // SAFETY: a `Vectors` is made only if AVX2 is available.
             unsafe { column_avx2(matrix, lane) }
         }
     }
@@ -358,10 +358,10 @@ impl<const WIDE: bool> Lanes for Vectors<WIDE> {
     #[inline(always)]
     fn spread(self, rows: u16) -> [u16; WIDTH] {
         if WIDE {
-            // SAFETY: a wide one is made only where AVX-512 BW and VL are.
+            // SAFETY: a wide one is made only if AVX-512 BW and VL are available.
             unsafe { spread_avx512(rows) }
         } else {
-            // SAFETY: a `Vectors` is made only where AVX2 is.
+            // SAFETY: a `Vectors` is made only if AVX2 is available.
             unsafe { spread_avx2(rows) }
         }
     }
@@ -369,10 +369,10 @@ impl<const WIDE: bool> Lanes for Vectors<WIDE> {
     #[inline(always)]
     fn number(self, lanes: u16, first: u32, place: &mut [u32; WIDTH]) {
         if WIDE {
-            // SAFETY: a wide one is made only where AVX-512 F is.
+            // SAFETY: a wide one is made only if AVX-512 F is available.
             unsafe { number_avx512(lanes, first, place) }
         } else {
-            // SAFETY: a `Vectors` is made only where AVX2 is.
+            // SAFETY: a `Vectors` is made only if AVX2 is available.
             unsafe { number_avx2(lanes, first, place) }
         }
     }

@@ -1,4 +1,4 @@
-//! The manifold of a patch: what is kept of squares and lines, and which patches are one.
+//! The manifold of a patch: which points of squares and lines are kept, and which patches are one.
 
 use super::super::at_place as contact;
 use super::*;

@@ -1,10 +1,10 @@
-//! The order in which an open list yields its pairs, against a plain queue that is searched.
+//! The order in which an open list yields its pairs, compared with a plain queue that is searched.
 
 use super::*;
 use proptest::prelude::*;
 use std::collections::VecDeque;
 
-/// What a list of a search yields next, looked for in all that was pushed and is still there, the oldest first.
+/// What a list of a search yields next: searched in all that was pushed and is still there, the oldest first.
 fn next_of(search: Search, all: &mut VecDeque<Open>) -> Option<Open> {
     match search {
         Search::BreadthFirst => all.pop_front(),
@@ -20,13 +20,13 @@ fn next_of(search: Search, all: &mut VecDeque<Open>) -> Option<Open> {
     }
 }
 
-/// Depth and boxes, bit for bit: `Open` itself compares as the heap does.
+/// Depth and boxes, bit for bit: `Open` compares as the heap does.
 fn bits(open: Open) -> (u64, u32, u32) {
     (open.low.to_bits(), open.a.0, open.b.0)
 }
 
 proptest! {
-    /// Lists of every search side by side in one arena; few depths, so that many are tied.
+    /// Lists of every search order in one arena; few depths, so that there are many ties.
     #[test]
     fn an_open_list_yields_in_the_order_of_its_search(
         steps in proptest::collection::vec((0..4_usize, 0..100_u32, 0..12_u32, 0..6_u32), 0..1500)

@@ -1,17 +1,17 @@
-//! Checks what a pair's entries are kept in: the heap of certificates, and the open list in the order of its search.
+//! Checks the storage of a pair's entries: the heap of certificates, and the open list in the order of its search.
 
 use super::{Arena, Group, Open, OpenList, Proved, Run, Search};
 
 impl Proved {
-    /// The block that it has.
+    /// Its block.
     pub(in crate::narrow) fn run(&self) -> &Run {
         &self.heap
     }
 
-    /// Structure check: a heap of groups that hold something, the soonest at hand.
+    /// Structure check: a heap of non-empty groups, with the soonest expiry cached.
     ///
     /// # Errors
-    /// One sentence on the first thing that does not hold.
+    /// One sentence on the first violation.
     pub(in crate::narrow) fn validate(&self, arena: &Arena<Group>) -> Result<(), String> {
         arena.validate_heap(&self.heap)?;
         let groups = arena.all(&self.heap);
@@ -30,7 +30,7 @@ impl Proved {
 }
 
 impl OpenList {
-    /// The block that it has.
+    /// Its block.
     pub(in crate::narrow) fn run(&self) -> &Run {
         &self.items
     }
@@ -38,12 +38,12 @@ impl OpenList {
     /// Structure check: a heap, a queue whose head is in it, or a stack.
     ///
     /// # Errors
-    /// One sentence on the first thing that does not hold.
+    /// One sentence on the first violation.
     pub(in crate::narrow) fn validate(&self, arena: &Arena<Open>) -> Result<(), String> {
         let (head, len) = (self.head, self.items.len());
         match self.search {
             Search::Priority => arena.validate_heap(&self.items)?,
-            // A queue that is used up begins anew.
+            // A queue that is used up starts again.
             Search::BreadthFirst if head < len.max(1) => return Ok(()),
             Search::BreadthFirst => {
                 return Err(format!("the head of a queue of {len} is at {head}"));

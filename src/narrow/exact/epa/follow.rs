@@ -1,7 +1,7 @@
-//! Polytopes of pairs that are followed: begun where the last query ended.
+//! Polytopes of pairs that are queried from tick to tick: begun where the last query ended.
 //!
-//! In: what an earlier query of the pair found and left, at poses that are not far from its own, mostly. Out: the gap,
-//! and what is left for the next query; nothing where what was left does not lead to an end.
+//! In: what an earlier query of the pair found and left, usually at nearby poses. Out: the gap, and what is left for
+//! the next query; nothing if the start from what was left fails.
 
 use super::super::newton::Refined;
 use super::super::pair::{CoreGap, Held, Pair};
@@ -9,8 +9,8 @@ use super::super::polytope::{Polytope, Shell};
 use super::{SCRATCH, State};
 use crate::math::Vec3;
 
-/// The gap of two cores by a polytope that begins around the closest point of an earlier answer; `None` where the cores
-/// are apart, or the ends stay apart.
+/// The gap of two cores by a polytope that begins around the closest point of an earlier answer; `None` if the cores
+/// are apart, or the ends do not meet.
 pub(in super::super) fn depth_around(
     pair: &Pair<'_>,
     found: &Refined,
@@ -33,8 +33,8 @@ pub(in super::super) fn depth_around(
     })
 }
 
-/// The gap of two cores by a polytope that begins at the face which an earlier one ended at; `None` where there was
-/// none, the cores are apart by now, or the ends stay apart.
+/// The gap of two cores by a polytope that begins at the face which an earlier one ended at; `None` if there was none,
+/// the cores are apart by now, or the ends do not meet.
 pub(in super::super) fn depth_at(
     pair: &Pair<'_>,
     held: &Held,
@@ -61,11 +61,10 @@ pub(in super::super) fn depth_at(
 }
 
 impl Polytope {
-    /// Begins with the shell of an earlier query, or, where that does not lead to an end, as `start` says; leaves that
-    /// of this one.
+    /// Begins with the shell of an earlier query, or, if that fails, with `start`; leaves the shell of this one.
     ///
     /// * `aside` - see [`Polytope::start_with`].
-    /// * `end` - grows and gives the gap, if that is good enough.
+    /// * `end` - grows and returns the gap, if that is good enough.
     fn along(
         &mut self,
         pair: &Pair<'_>,
@@ -94,8 +93,8 @@ impl Polytope {
         Some(gap)
     }
 
-    /// The gap where the features say enough of the directions around the best one for the polytope to begin with a cap
-    /// that stands for them; `None` where they do not, or another direction is better.
+    /// The gap, if the features prove enough about the directions around the best one for the polytope to begin with a
+    /// cap that represents them; `None` if they do not, or another direction is better.
     pub(in super::super) fn depth_under(
         &mut self,
         pair: &Pair<'_>,
@@ -105,7 +104,7 @@ impl Polytope {
         let cap = found
             .cap
             .filter(|cap| cap.loss_m <= pair.tolerance() / 2.0)?;
-        // What the features prove within the cap, and no more is told.
+        // What the features prove within the cap; no more is reported.
         let depth_m = -found.value - cap.loss_m;
         if depth_m <= 0.0 {
             return None;

@@ -1,4 +1,4 @@
-//! Polytopes: how many faces they take, and begun at what is known beside anew.
+//! Polytopes: how many faces they take, and runs that begin with known features compared with runs from scratch.
 
 use super::*;
 use crate::builtin::Random;
@@ -10,7 +10,7 @@ fn forget() {
     SCRATCH.with(|scratch| *scratch.borrow_mut() = Polytope::default());
 }
 
-/// Both hold the truth.
+/// Both intervals hold the true gap.
 fn agree(one: &Closest, other: &Closest, what: &dyn std::fmt::Debug) {
     let (x, y) = (one.gap, other.gap);
     assert!(x.min <= y.max && y.min <= x.max, "{x:?} {y:?} of {what:?}");
@@ -58,7 +58,7 @@ fn bug_solids_of_revolution_nearly_on_one_axis_took_milliseconds() {
     assert!(loose * 1000 <= asked, "{loose} of {asked} are not finished");
 }
 
-/// Deep, shallow, apart and back again: a polytope begun at what the last one ended at says what a new one does.
+/// Deep, shallow, apart and back again: a polytope begun where the last one ended agrees with a new one.
 #[test]
 fn a_polytope_begun_at_the_last_answer_says_what_one_begun_anew_does() {
     let mut corners = Vec::new();
@@ -114,14 +114,14 @@ fn a_polytope_begun_at_the_last_answer_says_what_one_begun_anew_does() {
     );
 }
 
-/// Needles, discs and all in between, along ways of small and large steps: all intervals are some 1e-7 wide, so what
-/// is carried along can be wrong by no more. Neither can what another pair left, which may be a shell of cores of the
-/// same kinds and quite other sizes.
+/// Needles, discs and everything in between, along ways of small and large steps: all intervals are some 1e-7 wide, so
+/// warm-started results can be wrong by no more. Nor can those started from what another pair left, which may be a
+/// shell of cores of the same kinds and very different sizes.
 #[test]
 fn answers_carried_along_a_way_agree_with_answers_anew_for_all_proportions() {
     let mut random = Random::new(23);
     let (mut deep, mut loose, mut asked, mut kept, mut strange) = (0, 0, 0, 0, 0);
-    // Of the last pair of each two kinds.
+    // The shell of the last pair of each combination of kinds.
     let mut left = vec![Shell::default(); 15];
     for turn in 0..2000 {
         let mut shape = |kind: u32| {
@@ -218,7 +218,7 @@ fn a_shell_is_the_surface_it_was_left_by_or_nothing() {
         let (one, other) = (distances(&polytope), distances(&again));
         assert_eq!(one.len(), other.len());
         for (x, y) in one.iter().zip(&other) {
-            // Where on a circle is kept as f32, and thin faces tilt by it.
+            // Positions on circles are kept as f32, which tilts thin faces.
             assert!((x - y).abs() < 1e-4, "{x} {y}");
         }
         same += 1;
@@ -226,7 +226,7 @@ fn a_shell_is_the_surface_it_was_left_by_or_nothing() {
     assert!(same > 100 && broken > 50, "{same} {broken}");
 }
 
-/// Their estimate was the depth of a polytope with no more than so many faces, which is off by 1e-4.
+/// Their estimate was the depth of a polytope with a capped number of faces, which is off by 1e-4.
 #[test]
 fn bug_a_post_within_the_edge_of_a_box_had_a_poor_estimate() {
     let half = Vec3::new(1.0, 1.0, 1.0);
@@ -235,7 +235,7 @@ fn bug_a_post_within_the_edge_of_a_box_had_a_poor_estimate() {
         let turn = Quat::from_axis_angle(&Vec3::x_axis(), lean);
         let at = Pose::from_parts(Vec3::new(1.0, 1.0, 0.0).into(), turn);
         let c = convex_gap(&Convex::cuboid(half), &post, &at, &mut Warm::default());
-        // Every direction between the two faces is as good: the radius.
+        // Every direction between the two faces is equally good: the radius.
         assert!((c.best_m + 0.5).abs() <= 2.0 * lean + 1e-9, "{lean}: {c:?}");
         assert!(c.gap.contains(c.best_m), "{lean}: {c:?}");
         let along = c.normal.dot(&(c.point_b - c.point_a));
@@ -243,7 +243,7 @@ fn bug_a_post_within_the_edge_of_a_box_had_a_poor_estimate() {
     }
 }
 
-/// A run that begins anew has no points yet: it told that cores apart in a plane touch.
+/// A run from scratch has no points yet: it reported coplanar cores that are apart as touching.
 #[test]
 fn bug_a_flat_difference_asked_from_nothing_told_of_points_that_are_none() {
     let flat =

@@ -1,14 +1,14 @@
-//! One polygon clipped by the edges of another, seen along the normal; each corner named by what meets there.
+//! One polygon clipped by the edges of another, along the normal; each corner is named by the lines that meet there.
 
 use crate::math::Vec3;
 use crate::narrow::exact::feature::{CORNERS_MAX, Feature};
 
-/// Lines along which a polygon is cut, beside its own edges: those of the other one. Names of corners have fewer bits.
+/// Flag of the lines along which a polygon is cut: the other's edges, not its own. Names of corners have fewer bits.
 pub(super) const CUT: u32 = 0x4000;
-/// What of a corner's name says which it is.
+/// The bits of a corner's name that identify the corner.
 const NAME: u32 = 0x3fff;
 
-/// Name of a new corner: the two lines that meet there, of which no others do.
+/// Name of a new corner: the pair of lines that meet there, which is unique.
 ///
 /// * `line` - of the polygon that is cut: [`NAME`] of the corner where its edge begins, or one of the cutting edges.
 /// * `edge` - the cutting edge, from 0 on.
@@ -16,13 +16,13 @@ pub(super) const fn met(line: u32, edge: u32) -> u32 {
     line | ((edge & NAME) + 1) << 15
 }
 
-/// A point of one feature that lies over the other, with the gap there and where it comes from.
+/// A point of one feature that lies over the other, with its origin.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Clip {
     /// On the core of the clipped feature, A's frame.
     pub(super) at: Vec3,
     pub(super) feature: u32,
-    /// The line along which the ring goes on from here.
+    /// The line along which the ring continues from here.
     line: u32,
 }
 
@@ -33,7 +33,7 @@ pub(super) struct Clipped {
 }
 
 impl Clipped {
-    /// `incident`, cut by the planes along the normal on the edges of `base`.
+    /// `incident`, cut by the planes along the normal through the edges of `base`.
     pub(super) fn onto(base: &Feature, incident: &Feature, normal: &Vec3) -> Self {
         let mut clipped = Self::of(incident);
         let corners = base.used();
@@ -64,7 +64,7 @@ impl Clipped {
         }
     }
 
-    /// Cuts off what lies beyond the plane. Source: Sutherland and Hodgman 1974, Reentrant polygon clipping.
+    /// Cuts off the part beyond the plane. Source: Sutherland and Hodgman 1974, Reentrant polygon clipping.
     fn cut(&mut self, on: &Vec3, outward: &Vec3, edge: u32) {
         let count = self.count;
         let mut over = [0.0; 2 * CORNERS_MAX];
@@ -84,7 +84,7 @@ impl Clipped {
         for k in 0..count {
             let next = if k + 1 < count { k + 1 } else { 0 };
             let (here, there) = (over[k], over[next]);
-            // Where the ring is left it goes on along the cut.
+            // Where the ring leaves, it continues along the cut.
             let on = if there > 0.0 {
                 CUT | edge & NAME
             } else {
@@ -94,7 +94,7 @@ impl Clipped {
                 let line = if here == 0.0 { on } else { old[k].line };
                 put(Clip { line, ..old[k] });
             }
-            // A segment is not a ring: its way back adds nothing.
+            // A segment is not a ring: the way back adds nothing.
             let crosses = (here < 0.0 && there > 0.0) || (here > 0.0 && there < 0.0);
             if crosses && !(count == 2 && k == 1) && count > 1 {
                 let t = here / (here - there);

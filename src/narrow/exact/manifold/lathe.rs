@@ -1,29 +1,29 @@
-//! How far the surface of a shape is from a point of its core, straight along the contact normal.
+//! Distance from a point of a shape's core to its surface, along the contact normal.
 //!
-//! In: a shape that is round about its z, and where that lies. Out: the way out. By the ball around that point alone a
-//! contact of a tilted capsule would lie within it: what is farther along the normal is the rest of the capsule's side.
+//! In: a shape of revolution about its z, and its pose. Out: the way out. By only the ball around that point, a contact
+//! of a tilted capsule would lie inside it: farther along the normal there is more of the capsule's side.
 
 use crate::math::Vec3;
 use crate::shape::{Convex, Core};
 
 /// A shape's surface in the frame of the contact.
 pub(super) enum Surface {
-    /// A core that is the whole shape, or a ball around one: as far from all of the core, metres.
+    /// A core that is the whole shape, or a margin around one: at this distance from all of the core, metres.
     Even(f64),
     Round(Lathe),
 }
 
-/// A shape that is round about an axis.
+/// A shape of revolution.
 pub(super) struct Lathe {
     middle: Vec3,
     /// Unit.
     axis: Vec3,
     half_m: f64,
-    /// Of its side at the middle.
+    /// Radius of its side at the middle.
     radius_m: f64,
-    /// How much less the radius is a metre higher.
+    /// Decrease of the radius per metre of height.
     taper: f64,
-    /// Whether it ends in half balls rather than discs.
+    /// Whether it ends in hemispheres instead of discs.
     has_balls: bool,
 }
 
@@ -48,14 +48,14 @@ impl Surface {
         })
     }
 
-    /// Of a shape in its own frame.
+    /// For a shape in its own frame.
     #[inline]
     pub(super) fn own(shape: &Convex) -> Self {
         Self::new(shape, Vec3::zeros(), Vec3::z())
     }
 
-    /// From a point of the core, or beside that of a capsule, along a unit vector to the surface, metres; `None`: the
-    /// line misses it.
+    /// Distance from a point of the core, or near that of a capsule, along a unit vector to the surface, metres;
+    /// `None`: the line misses it.
     #[inline]
     pub(super) fn way_out(&self, from: &Vec3, outward: &Vec3) -> Option<f64> {
         match self {
@@ -65,8 +65,8 @@ impl Surface {
         }
     }
 
-    /// From a point beside a line on the side of the core, along a unit vector back to the core, metres; `None`: the
-    /// line misses it. A capsule's is its [`Surface::way_out`].
+    /// Distance from a point near a line on the side of the core, along a unit vector back to the core, metres; `None`:
+    /// the line misses it. For a capsule it is [`Surface::way_out`].
     pub(super) fn way_back(&self, from: &Vec3, outward: &Vec3) -> Option<f64> {
         match self {
             Self::Round(lathe) if !lathe.has_balls => lathe.along(from, outward).to_side(),
@@ -75,13 +75,13 @@ impl Surface {
     }
 }
 
-/// A line seen from a lathe.
+/// A line in the frame of a lathe.
 struct Line {
-    /// Of its origin over the middle, and how much that grows a metre.
+    /// Height of its origin over the middle, and its increase per metre.
     height: f64,
     along: f64,
-    /// The square of the distance from the axis less that of the radius, at the origin; `square t^2 + 2 grows t` of it
-    /// is added in `t` metres.
+    /// The square of the distance from the axis less that of the radius, at the origin; it grows by
+    /// `square t^2 + 2 grows t` over `t` metres.
     beyond: f64,
     grows: f64,
     square: f64,
@@ -125,13 +125,13 @@ impl Lathe {
 /// Where `square t^2 + 2 grows t + beyond` rises through 0 for the last time.
 fn exit(square: f64, grows: f64, beyond: f64) -> Option<f64> {
     let root = (grows * grows - square * beyond).sqrt();
-    // Each where it takes nothing from its like.
+    // Each form where it does not cancel.
     let t = if grows > 0.0 {
         -beyond / (grows + root)
     } else {
         (root - grows) / square
     };
-    // A root of less than nothing is none, and so is a place where it falls.
+    // No root of a negative number counts, nor a place where it falls.
     (t.is_finite() && (grows > 0.0 || square > 0.0)).then_some(t)
 }
 
@@ -139,7 +139,7 @@ fn exit(square: f64, grows: f64, beyond: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// From points on the axis of a capsule, and from points beside it, against the distance from its segment.
+    /// From points on the axis of a capsule, and near it, compared with the distance from its segment.
     #[test]
     fn the_way_out_of_a_capsule_ends_on_its_surface() {
         let surface = Surface::own(&Convex::capsule(0.2, 0.5));
@@ -163,7 +163,7 @@ mod tests {
         assert_eq!(surface.way_out(&Vec3::new(0.3, 0.0, 0.0), &Vec3::y()), None);
     }
 
-    /// What is on a side is not moved, whichever way rounding has put it; what is beside it is.
+    /// A point on a side is not moved, whichever way it was rounded; a point off the side is.
     #[test]
     fn the_way_back_to_a_side_ends_on_it() {
         let (cylinder, cone) = (Convex::cylinder(0.2, 0.5), Convex::cone(0.2, 0.5));

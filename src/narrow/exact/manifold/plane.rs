@@ -1,17 +1,17 @@
-//! What a convex shape shows a half-space that it touches.
+//! The feature of a convex shape that touches a half-space.
 //!
 //! In: a shape and the exact answer of the pair. Out: the corners of its feature along the plane's normal that lie on
-//! the plane or behind it, all of them: which are kept is decided by who knows which were kept before.
+//! the plane or behind it, all of them: the caller knows which were kept before, and chooses.
 
 use super::{Closest, Convex, Feature, Found, ManifoldPoint, PREDICTION, SAME, Surface};
 use crate::math::{Pose, Vec3};
 
-/// Hands over the contact points of a shape that touches a half-space, up to 9, in A's frame.
+/// Passes on the contact points of a shape that touches a half-space, up to 9, in A's frame.
 ///
-/// * `at` - pose of the shape in A's frame where it is B; `None`: it is A itself.
+/// * `at` - pose of the shape in A's frame if it is B; `None`: it is A itself.
 /// * `closest` - the answer of `half_space_gap` or `gap_to_half_space` for the two.
 ///
-/// Cost: some 100 ns, of hulls as long as it takes to look at all faces; no allocation.
+/// Cost: some 100 ns, for hulls as long as it takes to visit all faces; no allocation.
 pub(in crate::narrow) fn points_on_plane(
     shape: &Convex,
     at: Option<&Pose>,
@@ -40,7 +40,7 @@ pub(in crate::narrow) fn points_on_plane(
     );
     for (corner, id) in feature.used().iter().zip(0..) {
         let id = feature.id(id);
-        // Straight down, or up, onto the plane.
+        // Vertically onto the plane.
         if at.is_some() {
             let height = normal.dot(&(corner - closest.point_a.coords));
             found.take(&(corner - normal * height), corner, id);

@@ -1,17 +1,17 @@
-//! What two leaves share along a normal that was found otherwise than by their own query.
+//! What two leaves share along a normal that does not come from their own query.
 //!
-//! In: a triangle of a mesh and a convex shape, and a normal; two triangles are clipped by `triangles`. Out: the
-//! clipped points, all of them: which are kept is decided among those of all leaves.
+//! In: a triangle of a mesh and a convex shape, and a normal; two triangles are clipped by `triangles`. Out: all
+//! clipped points; which are kept is decided among those of all leaves.
 
 use super::{Closest, Convex, FACING, Feature, Found, ManifoldPoint, Pair, clip_onto};
 use crate::math::{Pose, Vec3};
 
-/// As [`manifold`] for shapes that are leaves of meshes: all points that the two share along `normal`, whatever the
-/// answer of their own query was.
+/// As [`manifold`] for shapes that are leaves of meshes: all points that the two share along `normal`, regardless of
+/// the answer of their own query.
 ///
 /// * `normal` - unit, A's frame, from A to B.
-/// * `base_is_b` - whose face the points are cast onto; `None`: whose faces the normal more.
-/// * `take` - is given points on the surfaces in A's frame, the gap along `normal` and the feature.
+/// * `base_is_b` - whose face the points are projected onto; `None`: the one whose face is closer to the normal.
+/// * `take` - receives points on the surfaces in A's frame, the gap along `normal` and the feature.
 ///
 /// Cost: below a microsecond; no allocation.
 pub(in crate::narrow) fn shared_points(

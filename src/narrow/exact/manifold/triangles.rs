@@ -1,22 +1,22 @@
-//! What two triangles share along a normal: the one clipped by the other, without a feature made of either.
+//! What two triangles share along a normal: one clipped by the other, without making a feature of either.
 //!
-//! In: six corners, a normal and whose face the points are cast onto. Out: the clipped points, at most six. The twin of
-//! `shared_points`, whose room for polygons of eight corners costs more than the clipping of three.
+//! In: six corners, a normal and whose face the points are projected onto. Out: the clipped points, at most six. A
+//! fast `shared_points`, whose room for polygons of eight corners costs more than the clipping of three.
 
 use super::clipped::{CUT, met};
 use super::{FACING, ManifoldPoint, SAME};
 use crate::math::{Point, Vec3};
 use crate::narrow::exact::feature::RIM;
 
-/// A triangle that is cut three times has six corners; where rounding bends it, some more.
+/// A triangle that is cut three times has six corners; if rounding bends it, some more.
 const ROOM: usize = 8;
 
-/// Corners of what is left of a triangle, and where each comes from.
+/// Corners of the rest of a triangle, and the origin of each.
 #[derive(Clone, Copy)]
 struct Rest {
     at: [Vec3; ROOM],
     features: [u32; ROOM],
-    /// The line along which the ring goes on from each.
+    /// The line along which the ring continues from each.
     lines: [u32; ROOM],
     count: usize,
 }
@@ -24,8 +24,8 @@ struct Rest {
 /// As [`super::shared_points`] for two triangles with an area, both in A's frame.
 ///
 /// * `normal` - unit, A's frame, from A to B.
-/// * `base_is_b` - whose face the points are cast onto; `None`: whose faces the normal more.
-/// * `take` - is given points on the surfaces in A's frame, the gap along `normal` and the feature.
+/// * `base_is_b` - whose face the points are projected onto; `None`: the one whose face is closer to the normal.
+/// * `take` - receives points on the surfaces in A's frame, the gap along `normal` and the feature.
 ///
 /// Cost: some 100 ns; no allocation.
 pub(in crate::narrow) fn shared_by_triangles(
@@ -86,9 +86,9 @@ pub(in crate::narrow) fn shared_by_triangles(
     }
 }
 
-/// `incident`, cut by the planes along `normal` on the edges of `base`, and a point of `base`'s plane.
+/// `incident`, cut by the planes along `normal` through the edges of `base`, and a point of `base`'s plane.
 ///
-/// The base is larger by what rounding may take away at its rim (see `Feature::spread`).
+/// The base is enlarged by what rounding may take away at its rim (see `Feature::spread`).
 fn clip(base: &[Vec3; 3], incident: &[Vec3; 3], normal: &Vec3) -> (Rest, Vec3) {
     let middle = |t: &[Vec3; 3]| (t[0] + t[1] + t[2]) / 3.0;
     let inner = middle(base);
@@ -112,9 +112,9 @@ fn clip(base: &[Vec3; 3], incident: &[Vec3; 3], normal: &Vec3) -> (Rest, Vec3) {
 }
 
 impl Rest {
-    /// Cuts off what lies beyond the plane. Source: Sutherland and Hodgman 1974, Reentrant polygon clipping.
+    /// Cuts off the part beyond the plane. Source: Sutherland and Hodgman 1974, Reentrant polygon clipping.
     ///
-    /// * `edge` - the plane's place, from 0 on: what a new corner is named by, and the line that it lies on.
+    /// * `edge` - the plane's index, from 0 on: part of a new corner's name, and the line that it lies on.
     fn cut(&self, on: &Vec3, outward: &Vec3, edge: u32) -> Self {
         let mut over = [0.0; ROOM];
         let (mut beyond, mut within) = (false, false);
@@ -133,7 +133,7 @@ impl Rest {
         for k in 0..self.count {
             let next = if k + 1 == self.count { 0 } else { k + 1 };
             let (here, there) = (over[k], over[next]);
-            // Where the ring is left it goes on along the cut.
+            // Where the ring leaves, it continues along the cut.
             let on = if there > 0.0 {
                 CUT | edge
             } else {

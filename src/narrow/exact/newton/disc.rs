@@ -1,7 +1,7 @@
-//! A disc face on: the best normal is its axis, where Newton's circles have no tangent.
+//! A disc seen face on: the best normal is its axis, where Newton's circles have no tangent.
 //!
-//! In: the elements of an earlier answer and its normal. Out: what Newton would end at, in closed form, if the normal
-//! lies near the axis of a disc and the other core touches the disc inside its rim.
+//! In: the elements of an earlier answer and its normal. Out: what Newton would converge to, in closed form, if the
+//! normal lies near the axis of a disc and the other core touches the disc inside its rim.
 
 use super::super::pair::{Held, Pair};
 use super::Refined;
@@ -12,7 +12,7 @@ use crate::math::{Vec3, across_z};
 /// Cosine of the angle between a normal and an axis up to which the disc is tried.
 const NEAR: f64 = 0.995;
 
-/// The local greatest `f` at the axis of a disc that takes part; `None` where there is none near `normal`.
+/// The local maximum of `f` at the axis of an active disc; `None` if there is none near `normal`.
 pub(super) fn face_on(pair: &Pair<'_>, set: &Set, normal: &Vec3) -> Option<Refined> {
     let axis_of_b: Vec3 = pair.rotation.column(2).into_owned();
     set.actives[..set.count].iter().find_map(|x| {
@@ -28,16 +28,16 @@ pub(super) fn face_on(pair: &Pair<'_>, set: &Set, normal: &Vec3) -> Option<Refin
     })
 }
 
-/// What touches a disc whose face is square to `n`.
+/// The contact with a disc whose face is orthogonal to `n`.
 ///
-/// * `is_a` - whose disc it is.
+/// * `is_a` - whether the disc is A's.
 fn touched(pair: &Pair<'_>, normal: &Vec3, n: &Vec3, is_a: bool, radius_m: f64) -> Option<Refined> {
     if normal.dot(n) < NEAR {
         return None;
     }
     let support = pair.support(n);
     let value = n.dot(&support.w);
-    // The other's point, and the one straight across from it on the disc, seen from the disc's own frame.
+    // The other core's point, and the opposite one on the disc, in the disc's own frame.
     let (point_a, point_b, seen) = if is_a {
         let point = support.b - n * value;
         (point, support.b, point)

@@ -1,10 +1,10 @@
-//! The elements that take part: vertices and circles of both cores, with what each says at a normal.
+//! The active elements: vertices and circles of both cores, with the value of each at a normal.
 
 use super::super::pair::{Held, Pair, Vertex};
 use crate::math::{Vec3, across_z};
 use crate::shape::Core;
 
-/// A pair of elements that takes part, with its weight.
+/// An active pair of elements, with its weight.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Active {
     pub(super) of_a: u32,
@@ -20,18 +20,18 @@ pub(super) struct Active {
     pub(super) rims: [Rim; 2],
 }
 
-/// A circle as it is seen along a unit normal.
+/// A circle seen along a unit normal.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Rim {
     /// Sine of the angle between its axis and the normal.
     pub(super) lean: f64,
-    /// By how much its farthest point moves when the normal turns along it, metres for an angle of 1.
+    /// How far its farthest point moves when the normal turns along it, metres per radian.
     pub(super) bend_m: f64,
-    /// The way that point moves, along the two tangents.
+    /// The direction of that motion, along the two tangents.
     pub(super) along: [f64; 2],
 }
 
-/// The elements that take part.
+/// The active elements.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Set {
     pub(super) actives: [Active; 3],
@@ -50,7 +50,7 @@ impl Default for Set {
 }
 
 impl Rim {
-    /// A vertex has none.
+    /// For a vertex, which has no circle.
     const NONE: Self = Self {
         lean: 0.0,
         bend_m: 0.0,
@@ -84,7 +84,7 @@ impl Active {
 }
 
 impl Set {
-    /// Vertices on one pair of elements are one: they cluster where a circle is being approached.
+    /// Vertices on the same pair of elements are merged: they cluster where a circle is being approached.
     pub(super) fn of(vertices: &[Vertex], weights: &[f64]) -> Self {
         let mut set = Self::default();
         for (vertex, weight) in vertices.iter().zip(weights) {
@@ -104,7 +104,7 @@ impl Set {
         (self.actives[..self.count].iter()).position(|x| x.of_a == of_a && x.of_b == of_b)
     }
 
-    /// False where there is no room.
+    /// False if there is no room.
     fn push(&mut self, of_a: u32, of_b: u32, weight: f64) -> bool {
         let room = self.actives.get_mut(self.count);
         let fits = room.is_some();
@@ -128,7 +128,7 @@ impl Set {
         held
     }
 
-    /// False where the elements take part already, or there is no room.
+    /// False if the elements are active already, or there is no room.
     pub(super) fn join(&mut self, vertex: &Vertex) -> bool {
         let (of_a, of_b) = (vertex.of_a, vertex.of_b);
         self.place_of(of_a, of_b).is_none() && self.push(of_a, of_b, 0.0)
@@ -141,7 +141,7 @@ impl Set {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Supports, slopes and curvatures at `n`; `None` where a circle is seen along its axis.
+    /// Supports, slopes and curvatures at `n`; `None` if a circle is seen along its axis.
     pub(super) fn evaluate(
         &mut self,
         pair: &Pair<'_>,
@@ -199,8 +199,8 @@ impl Set {
     }
 }
 
-/// Farthest point of an element along `dir`, the tangent it moves along when `dir` turns, and how its circle is seen.
-// A call would hand all of it over in memory: a tenth of a query of cores that are apart.
+/// Farthest point of an element along `dir`, the tangent it moves along when `dir` turns, and its circle as seen.
+// A call would pass all of it through memory: a tenth of a query of cores that are apart.
 #[inline(always)]
 fn element(core: &Core, element: u32, dir: &Vec3) -> Option<(Vec3, Vec3, Rim)> {
     let Some(circle) = core.circle(element) else {

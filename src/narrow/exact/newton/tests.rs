@@ -1,4 +1,4 @@
-//! Newton's step beside the whole system, and what the elements say beside all directions.
+//! Newton's step compared with the whole system, and the bounds of the elements compared with all directions.
 
 use super::set::Rim;
 use super::*;
@@ -9,7 +9,7 @@ use crate::narrow::exact::{Warm, convex_gap};
 use crate::shape::Convex;
 use nalgebra::{DMatrix, DVector};
 
-/// The system of one step, whole: two coordinates, then the change of each weight but the first.
+/// The full system of one step: two coordinates, then the change of each weight except the first.
 fn whole(set: &Set) -> Option<Vec<f64>> {
     let size = set.count + 1;
     let (mut m, mut right) = (DMatrix::zeros(size, size), DVector::zeros(size));
@@ -67,7 +67,7 @@ fn a_step_solves_the_whole_system() {
     }
 }
 
-/// Solids with faces, edges and rims, in all pairs, at poses by chance: what Newton makes of their overlap.
+/// Solids with faces, edges and rims, in all pairs, at random poses: Newton's results for their overlap.
 fn overlaps(mut each: impl FnMut(&Pair<'_>, &Refined, &mut Random)) {
     let mut random = Random::new(19);
     let shapes = [
@@ -84,7 +84,7 @@ fn overlaps(mut each: impl FnMut(&Pair<'_>, &Refined, &mut Random)) {
         for turn in 0..120 {
             let spread = random.range(0.05, 0.5);
             let at = random.direction() * spread;
-            // Every fourth stands upright or lies: faces on faces, rims on faces.
+            // Every fourth is upright or lies flat: faces on faces, rims on faces.
             let upright = turn % 4 == 0;
             let axis = random.direction();
             let by = if upright { 0.0 } else { random.range(0.0, 3.0) };
@@ -126,7 +126,7 @@ fn no_direction_within_a_cap_is_better() {
     assert!(wide * 2 > caps.iter().sum::<u32>(), "{wide} of {caps:?}");
 }
 
-/// What the features lose by rounding is lost to the answer, too.
+/// What the features lose by rounding is taken off the answer, too.
 #[test]
 fn an_answer_under_a_cap_is_no_tighter_than_the_cap() {
     let mut under = 0;
@@ -145,7 +145,7 @@ fn an_answer_under_a_cap_is_no_tighter_than_the_cap() {
         };
         under += 1;
         assert!(gap.upper >= found.value + loss_m, "{gap:?} {lossy:?}");
-        // Nor is there an answer where nothing is left of the depth.
+        // Nor is there an answer if nothing is left of the depth.
         let shallow = Refined {
             value: -loss_m / 2.0,
             ..lossy
@@ -159,7 +159,7 @@ fn an_answer_under_a_cap_is_no_tighter_than_the_cap() {
     assert!(under > 500, "{under}");
 }
 
-/// Else a cap would hide better directions than its own.
+/// Otherwise a cap would hide better directions than its own.
 #[test]
 fn what_stands_for_a_cap_is_not_reached_outside_of_it() {
     for half in [0.026, 0.05, 0.15, 0.25, 0.42] {
@@ -202,7 +202,7 @@ fn a_disc_is_met_face_on_where_the_other_touches_inside_its_rim() {
             found.value
         );
         assert!((found.point_a - Vec3::new(tip.x, tip.y, 0.1)).norm() < 1e-14);
-        // Seen from the other side it is the same.
+        // The result is the same seen from the other side.
         let turned = Pair::new(&cone, &flat, &pose.inverse());
         let n = -pair.to_b(&Vec3::z());
         let mut set = Set::default();

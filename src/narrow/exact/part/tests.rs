@@ -1,12 +1,12 @@
-//! Slivers between two planes: how far they are apart is known but for what rounding of their corners takes.
+//! Slivers between two planes: their distance is known up to the rounding of their corners.
 
 use crate::builtin::Random;
 use crate::math::{Pose, Quat, Vec3};
 use crate::narrow::exact::{Warm, convex_gap};
 use crate::shape::Convex;
 
-/// One case: two slivers with an edge each in two planes across z, where the edges cross as seen along it, and all else
-/// of them farther out.
+/// One case: two slivers with one edge each, in two planes orthogonal to z, where the edges cross seen along z;
+/// everything else of them is farther out.
 struct Case {
     a: Convex,
     b: Convex,
@@ -14,7 +14,7 @@ struct Case {
     gap_m: f64,
 }
 
-/// Spread of both and their distance at most, metres.
+/// Greatest extent of both and their distance, metres.
 const SIZE_M: f64 = 4.0;
 
 fn pose(random: &mut Random) -> Pose {
@@ -23,7 +23,7 @@ fn pose(random: &mut Random) -> Pose {
     Pose::from_parts((random.direction() * random.unit()).into(), turn)
 }
 
-/// A sliver with an edge in the plane at `z`, across the z axis; all else on the side of `out`, or in the plane too.
+/// A sliver with an edge in the plane at `z`, across the z axis; the rest is on the side of `out`, or in the plane too.
 fn sliver(
     random: &mut Random,
     from: &Pose,
@@ -72,8 +72,8 @@ fn case(random: &mut Random, turn: usize) -> Case {
     }
 }
 
-/// Of slivers of 1e-13 to 1e-2 of their length, nearly parallel to each other, one in 17 was told as touching, and the
-/// intervals of one in six were wider than a hundredth of the gap. What is left would take differences of more digits.
+/// Of slivers with widths of 1e-13 to 1e-2 of their length, nearly parallel to each other, one in 17 was reported as
+/// touching, and the intervals of one in six were wider than a hundredth of the gap. The rest would need more digits.
 #[test]
 fn bug_slivers_that_are_apart_were_told_as_touching() {
     let rounding = 64.0 * f64::EPSILON * SIZE_M;
@@ -87,7 +87,7 @@ fn bug_slivers_that_are_apart_were_told_as_touching() {
             "turn {turn}: {} m apart: {c:?}",
             case.gap_m
         );
-        // What rounding of the relative pose may move is no gap to tell.
+        // Gaps within the rounding of the relative pose are not counted.
         if case.gap_m > 8.0 * rounding {
             told += 1;
             touching += usize::from(c.collides());

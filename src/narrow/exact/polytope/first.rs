@@ -1,4 +1,4 @@
-//! How a polytope begins: a tetrahedron of what is known, or a cap and what lies below it.
+//! The start of a polytope: a tetrahedron of known vertices, or a cap and vertices below it.
 
 use super::super::newton::Cap;
 use super::super::pair::{CoreGap, Held, NO_ELEMENT, Pair, Vertex, frame, unit};
@@ -9,8 +9,8 @@ use crate::math::Vec3;
 /// Sine of 60 degrees.
 const SIXTY: f64 = 0.866_025_403_784_438_6;
 
-/// Corners and neighbours of the faces of an antiprism: the cap, what joins each of its sides to a corner below, each
-/// two corners below to one above, and the bottom.
+/// Corners and neighbours of the faces of an antiprism: the cap, the faces from each of its sides to a corner below,
+/// those from each two corners below to one above, and the bottom.
 const ANTIPRISM: [([Place; 3], [Place; 3]); 8] = [
     ([0, 1, 2], [1, 2, 3]),
     ([0, 3, 1], [6, 4, 0]),
@@ -23,9 +23,9 @@ const ANTIPRISM: [([Place; 3], [Place; 3]); 8] = [
 ];
 
 impl Polytope {
-    /// A tetrahedron of `top` and three vertices that lie on the other side of the origin, as seen from it; false where
-    /// it is a sliver. Whoever knows the closest point begins with it, and need not ask whether the cores overlap. The
-    /// origin may be outside yet: the faces that it lies in front of are then those nearest to it.
+    /// A tetrahedron of `top` and three vertices on the other side of the origin; false if it is a sliver. A caller
+    /// that knows the closest point begins with it, and need not test whether the cores overlap. The origin may still
+    /// be outside: the faces that it lies in front of are then the nearest to it.
     ///
     /// * `out` - unit, from the origin to `top`.
     pub(in super::super) fn start_below(
@@ -38,14 +38,14 @@ impl Polytope {
         let (one, other) = frame(out);
         self.vertices.push(top);
         for (x, y) in [(1.0, 0.0), (-0.5, SIXTY), (-0.5, -SIXTY)] {
-            // The support is asked for the way it is least along.
+            // The support is queried in the direction that it minimises.
             self.vertices.push(pair.support(&-(one * x + other * y)));
         }
         self.close_first()
     }
 
-    /// Where a point that stands for a cap is to be, on the side of the way out on which one was before; `None`: it was
-    /// on no side.
+    /// Where to place a point that represents a cap: on the same side of the way out as before; `None`: it was on no
+    /// side.
     ///
     /// * `out`, `depth_m` - as in [`Polytope::start_under`].
     pub(in super::super) fn beside(
@@ -58,8 +58,8 @@ impl Polytope {
         Some(standing(out, depth_m, cap, &side))
     }
 
-    /// An antiprism: three points of the plane that the cap says the difference reaches in any case, and three vertices
-    /// around the middle. Those points need not lie in the difference, see [`Cap::rise`].
+    /// An antiprism: three points in the plane that the difference reaches according to the cap, and three vertices
+    /// below, around the middle. The three points need not lie in the difference, see [`Cap::rise`].
     ///
     /// * `out` - unit, from the origin to the cap.
     /// * `depth_m` - distance of that plane.
@@ -82,7 +82,7 @@ impl Polytope {
             });
         }
         for k in [2, 0, 1] {
-            // Between two of the points above; the support is asked for the way it is least along.
+            // Between two of the points above; the support is queried in the direction that it minimises.
             self.vertices.push(pair.support(&around[k]));
         }
         self.met.resize(self.vertices.len(), 0);
@@ -91,8 +91,8 @@ impl Polytope {
         }
     }
 
-    /// A tetrahedron of three vertices and the one that is farthest the other way; false where it is a sliver. It need
-    /// not hold the origin.
+    /// A tetrahedron of three vertices and the farthest vertex on the other side; false if it is a sliver. It need not
+    /// contain the origin.
     ///
     /// * `out` - unit, from the origin to the three.
     pub(in super::super) fn start_at(
@@ -108,7 +108,7 @@ impl Polytope {
         self.close_first()
     }
 
-    /// Makes the faces of the first four vertices; false where they are a sliver.
+    /// Makes the faces of the first four vertices; false if they are a sliver.
     fn close_first(&mut self) -> bool {
         let whole = self.vertices.first_chunk().is_some_and(has_volume);
         if whole {
@@ -117,9 +117,9 @@ impl Polytope {
         whole
     }
 
-    /// A tetrahedron with a volume, or the gap when the difference is flat.
+    /// A tetrahedron with a volume, or the gap if the difference is flat.
     ///
-    /// * `axes` - orthogonal; where the simplex does not do, the tetrahedron begins along one of them.
+    /// * `axes` - orthogonal; if the simplex is not usable, the tetrahedron begins along one of them.
     #[allow(clippy::result_large_err, reason = "lives on the stack for one query")]
     pub(in super::super) fn start(
         &mut self,
@@ -194,12 +194,12 @@ impl Polytope {
     }
 }
 
-/// A point that stands for a cap, on a side of the way out.
+/// A point that represents a cap, on a side of the way out.
 fn standing(out: &Vec3, depth_m: f64, cap: &Cap, side: &Vec3) -> Vec3 {
     out * depth_m + side * (depth_m * cap.rise())
 }
 
-/// Whether a tetrahedron is not a sliver.
+/// Whether a tetrahedron has a volume.
 fn has_volume(vertices: &[Vertex; 4]) -> bool {
     let w = vertices.map(|v| v.w);
     let normal = (w[1] - w[0]).cross(&(w[2] - w[0]));
@@ -208,7 +208,7 @@ fn has_volume(vertices: &[Vertex; 4]) -> bool {
     area > 0.0 && height > 1e-3 * area * area.sqrt()
 }
 
-/// The gap when the difference has no thickness along `normal`: 0 but for rounding, separated at once along it.
+/// The gap if the difference has no thickness along `normal`: 0 up to rounding, and any motion along it separates.
 fn flat(pair: &Pair<'_>, normal: &Vec3, simplex: &Simplex) -> CoreGap {
     let (one, other) = (
         normal.dot(&pair.support(normal).w),
@@ -220,7 +220,7 @@ fn flat(pair: &Pair<'_>, normal: &Vec3, simplex: &Simplex) -> CoreGap {
         (other, -*normal)
     };
     let (point_a, point_b) = simplex.witnesses();
-    // A run that begins from nothing has no points of the cores to tell of.
+    // A run from scratch has no points of the cores to report.
     let apart_m = if simplex.count == 0 {
         f64::INFINITY
     } else {

@@ -1,13 +1,13 @@
-//! The shell: the surface that a polytope ends with, kept for the next query of the pair to begin from.
+//! The shell: the final surface of a polytope, kept as the start of the pair's next query.
 //!
-//! In: a polytope that holds a ball as deep as the cores overlap. Out, at other poses: the same surface, where it is
-//! one.
+//! In: a polytope that contains a ball as deep as the cores overlap. Out, at other poses: the same surface, if it still
+//! is one.
 //!
-//! Corners are kept as the elements they lie on, and where on a circle. Put together at any poses, of any two cores,
-//! they are points of the Minkowski difference: a shell may be out of date, and proves no less. A closed surface whose
-//! faces all look away from the origin has it inside, bent or not, so that [`epa`](super::super::epa) goes on as if it
-//! had just made it: while the cores move by little its faces are mostly as far out as is asked for, and each of them
-//! is looked at once; where not, it grows.
+//! Corners are kept as the elements they lie on, plus the position on a circle. Evaluated at any poses, of any two
+//! cores, they are points of the Minkowski difference: an outdated shell is still sound. A closed surface whose faces
+//! all look away from the origin contains it, bent or not, so that [`epa`](super::super::epa) continues as if it had
+//! just made it: while the cores move little its faces are usually far enough out already, and each is visited once;
+//! otherwise, it grows.
 
 use super::super::pair::{NO_ELEMENT, Pair, Vertex};
 use super::{Place, Polytope};
@@ -15,25 +15,25 @@ use crate::math::{Vec3, f32_near};
 use crate::shape::Core;
 use crate::simd::boxes::prefetch;
 
-/// Corners of a shell, at most: overlapping curved cores end with some fourteen, and one in twenty with more than this.
+/// Most corners of a shell: overlapping curved cores end with some fourteen, and one in twenty with more than this.
 const CORNERS_MAX: usize = 32;
-/// As many triangles close a surface with so many corners.
+/// The number of triangles in a closed surface with that many corners.
 const FACES_MAX: usize = 2 * CORNERS_MAX - 4;
-/// Vertices and faces of a polytope of which a shell can be left, dead ones too.
+/// Most vertices and faces of a polytope of which a shell can be left, including dead ones.
 const VERTICES_SEEN: usize = 128;
 const FACES_SEEN: usize = 512;
 
-/// The surface that an exact query of a pair ended with, for the next one; see [`convex_gap_along`].
+/// The final surface of an exact query of a pair, for the next one; see [`convex_gap_along`].
 ///
 /// [`convex_gap_along`]: super::super::convex_gap_along
 #[derive(Clone, Debug)]
-// In this order, so that what most of them fill lies side by side.
+// In this order, so that the part that most shells fill is contiguous.
 #[repr(C)]
 pub struct Shell {
     corners_len: u8,
-    /// 0: nothing is kept.
+    /// 0: empty.
     faces_len: u8,
-    /// It was what the query at hand ended with.
+    /// The current query ended with it.
     pub(in super::super) used: bool,
     corners: [Corner; CORNERS_MAX],
     faces: [Triangle; FACES_MAX],
@@ -48,12 +48,12 @@ struct Triangle {
     beside: [u8; 3],
 }
 
-/// A vertex by what it lies on.
+/// A vertex, given by the elements it lies on.
 #[derive(Clone, Copy, Debug, Default)]
 struct Corner {
     of_a: u32,
     of_b: u32,
-    /// Where on a circle of A, along x and y of its frame, and where on one of B; of a corner that stands for a cap its
+    /// Position on a circle of A, as x and y of its frame, and on a circle of B; for a corner that represents a cap its
     /// place in A's frame, metres.
     at: [f32; 4],
 }
@@ -71,13 +71,13 @@ impl Default for Shell {
 }
 
 impl Shell {
-    /// Whether nothing is kept.
+    /// Whether it is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.faces_len == 0
     }
 
-    /// Says that it is wanted soon: as much of it as most fill.
+    /// Prefetches it: the part that most shells fill.
     #[inline]
     pub(in crate::narrow) fn ask_ahead(&self) {
         prefetch(&self.faces_len);
@@ -90,7 +90,7 @@ impl Shell {
         }
     }
 
-    /// Keeps nothing.
+    /// Empties it.
     pub fn clear(&mut self) {
         (self.corners_len, self.faces_len) = (0, 0);
     }
@@ -111,9 +111,9 @@ impl Corner {
         }
     }
 
-    /// The vertex at the poses of a pair; `None` where a core has no such element.
+    /// The vertex at the poses of a pair; `None` if a core has no such element.
     ///
-    /// * `aside` - puts a corner in its place that stands for a cap.
+    /// * `aside` - places a corner that represents a cap.
     fn vertex(&self, pair: &Pair<'_>, aside: impl Fn(&Vec3) -> Option<Vec3>) -> Option<Vertex> {
         let [x, y, z, _] = self.at.map(f64::from);
         let (a, b) = if self.of_a == NO_ELEMENT {
@@ -139,7 +139,7 @@ impl Corner {
 }
 
 impl Polytope {
-    /// Leaves the surface as a shell, if it is whole and not too large for one.
+    /// Leaves the surface as a shell, if it is complete and not too large.
     pub(in super::super) fn leave(&self, pair: &Pair<'_>, shell: &mut Shell) {
         shell.clear();
         if self.vertices.len() > VERTICES_SEEN || self.faces.len() > FACES_SEEN {
@@ -178,9 +178,9 @@ impl Polytope {
         shell.used = true;
     }
 
-    /// Begins with a shell; false where there is none, it is that of other cores, or it does not hold the origin.
+    /// Begins with a shell; false if there is none, it belongs to other cores, or it does not contain the origin.
     ///
-    /// * `aside` - puts a corner in its place that stands for a cap.
+    /// * `aside` - places a corner that represents a cap.
     pub(in super::super) fn start_with(
         &mut self,
         pair: &Pair<'_>,

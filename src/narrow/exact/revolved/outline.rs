@@ -1,4 +1,4 @@
-//! What a solid of revolution shows in a plane: a convex polygon.
+//! The outline of a solid of revolution in a plane: a convex polygon.
 //!
 //! In: a core, the direction of its axis in the plane. Out: corners, edge normals, supports.
 
@@ -11,7 +11,7 @@ pub(super) fn dot(a: Flat, b: Flat) -> f64 {
     a[0] * b[0] + a[1] * b[1]
 }
 
-/// Corners of an outline, at most.
+/// Most corners of an outline.
 pub(super) const CORNERS_MAX: usize = 4;
 
 /// A convex polygon, counter-clockwise, or a segment.
@@ -39,7 +39,7 @@ impl Outline {
         Some(Self { corners, count })
     }
 
-    /// The same with its axis along `axis`, which is shorter than 1 where it leans out of the plane.
+    /// The same with its axis along `axis`, which is shorter than 1 if it leans out of the plane.
     pub(super) fn along(&self, axis: Flat) -> Self {
         let length = axis[0].hypot(axis[1]);
         let side = [axis[1] / length, -axis[0] / length];
@@ -76,8 +76,8 @@ impl Outline {
         best
     }
 
-    /// Of the corners that are as far along `n` as any, but for `same`, the first and the last along `tangent`: how far
-    /// along it, and which.
+    /// Of the corners within `same` of the farthest along `n`, the first and the last along `tangent`: the position
+    /// along it, and the corner.
     pub(super) fn shown(&self, n: Flat, tangent: Flat, same: f64) -> [(f64, usize); 2] {
         let most = dot(self.corners[self.farthest(n)], n);
         let mut ends = [(f64::INFINITY, 0), (f64::NEG_INFINITY, 0)];

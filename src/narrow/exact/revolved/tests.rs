@@ -1,11 +1,11 @@
-//! Bounds between planes, against the planes in between.
+//! Bounds between planes, compared with the planes in between.
 
 use super::*;
 use crate::math::{Point, Pose, Quat};
 use crate::narrow::exact::{Warm, convex_gap};
 use crate::shape::Convex;
 
-/// Numbers without a pattern, 0 to 1.
+/// Quasi-random numbers, 0 to 1.
 fn spread(k: u32) -> f64 {
     (f64::from(k) * 0.618_033_988_749_894_9).fract()
 }
@@ -47,7 +47,7 @@ fn no_plane_between_two_shows_a_greater_gap_than_their_bound() {
             let mut between = Best::from(None);
             planes.slice(from + width * f64::from(step) / 64.0, &mut between);
             assert!(between.shown <= bound + pair.tiny(), "{a:?} {b:?} {pose:?}");
-            // What the pair itself says along any direction of the plane is not above it either.
+            // The pair's own `f` along any direction of the plane is not above it either.
             assert!(between.value <= bound + pair.tiny(), "{a:?} {b:?} {pose:?}");
         }
         asked += 1;
@@ -59,7 +59,7 @@ fn no_plane_between_two_shows_a_greater_gap_than_their_bound() {
     );
 }
 
-/// Numbers without a pattern, 0 to 1, of all steps. Source: Steele et al. 2014, Fast splittable pseudorandom numbers.
+/// Pseudorandom numbers, 0 to 1, of all step sizes. Source: Steele et al. 2014, Fast splittable pseudorandom numbers.
 fn hashed(k: u64) -> f64 {
     let z = (k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,6 +1,6 @@
-//! What sectors answer with: the best direction refined by Newton, and the closest points along it.
+//! The answer of the sectors: the best direction refined by Newton, and the closest points along it.
 //!
-//! In: the best direction known, and the bound proved. Out: the gap of the cores.
+//! In: the best direction known, and the proved bound. Out: the gap of the cores.
 
 use super::super::closed::nearest;
 use super::super::newton::{self, Refined};
@@ -8,11 +8,11 @@ use super::super::pair::{CoreGap, Held};
 use super::{Around, Best};
 use crate::math::Vec3;
 
-/// How far aside of the best normal its features are asked for.
+/// Distance from the best normal at which its features are queried.
 const FEATURES_ASIDE: f64 = 1e-2;
 
 impl Around<'_> {
-    /// Four small ways aside of the best direction: in its plane, and out of it.
+    /// Four small displacements from the best direction: in its plane, and out of it.
     fn ways(&self, best: &Best) -> [Vec3; 4] {
         let (along, [x, z]) = (best.along, best.n);
         let up = self.normal(&(along * -z + Vec3::z() * x)) * FEATURES_ASIDE;
@@ -20,7 +20,7 @@ impl Around<'_> {
         [up, -up, side, -side]
     }
 
-    /// Newton on the features around the best direction, if a plane showed it.
+    /// Runs Newton on the features around the best direction, if a plane showed it.
     pub(super) fn refine(&self, best: &mut Best) {
         if best.refined.is_some() {
             return;
@@ -58,7 +58,7 @@ impl Around<'_> {
         }
     }
 
-    /// Points straight across from each other: of what the other core shows, the one that is nearest to both surfaces.
+    /// Opposite points: among those of the other core's feature, the one nearest to both surfaces.
     fn witnesses(&self, best: &Best) -> (Vec3, Vec3) {
         let pair = self.pair;
         let (out, round) = if self.a_is_round {
@@ -84,7 +84,7 @@ impl Around<'_> {
             for other in &shown[k..] {
                 let (from, way) = (one - across, other - one);
                 let height = from.z.clamp(-half_m, half_m) - from.z;
-                // The one, the middle, where they cross the plane, and where they are as high as the round core.
+                // The first, the middle, where they cross the plane, and where they are as high as the round core.
                 for part in [0.0, 0.5, -from.dot(&side) / way.dot(&side), height / way.z] {
                     let point = one + way * part.clamp(0.0, 1.0);
                     let near = nearest(round.core(), &(point - across));

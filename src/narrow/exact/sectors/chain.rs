@@ -1,13 +1,13 @@
 //! A chain of points of the difference around one side of an axis, and the distance that it proves.
 //!
-//! In: points, each of the other core and a corner of the round one's outline. Out: the least distance at one plane, or
-//! at all planes of a sector.
+//! In: points, each the sum of a point of the other core and a corner of the round one's outline. Out: the least
+//! distance in one plane, or in all planes of a sector.
 
 use std::cmp::Ordering;
 
 use crate::math::Vec3;
 
-/// Points of a chain, at most.
+/// Most points of a chain.
 const LINKS_MAX: usize = 12;
 
 /// Along a plane from the axis, and along the axis, metres.
@@ -17,17 +17,17 @@ pub(super) fn dot(p: Flat, q: Flat) -> f64 {
     p[0] * q[0] + p[1] * q[1]
 }
 
-/// A point of the difference of the other core and the round one, whatever the plane.
+/// A point of the difference of the other core and the round one, for any plane.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Link {
     /// On the other core, frame of the round one.
     pub(super) of_other: Vec3,
-    /// Corner of the round core's outline, turned half around its origin.
+    /// Corner of the round core's outline, rotated by half a turn about its origin.
     pub(super) corner: Flat,
 }
 
 impl Link {
-    /// Its place in the plane along a direction square to the axis.
+    /// Its place in the plane along a direction orthogonal to the axis.
     pub(super) fn at(&self, along: &Vec3) -> Flat {
         [
             self.corner[0] + (self.of_other.x * along.x + self.of_other.y * along.y),
@@ -40,7 +40,7 @@ impl Link {
     }
 }
 
-/// Points from the top down, each lower than the one before.
+/// Points in descending order of height.
 #[derive(Default)]
 pub(super) struct Chain {
     pub(super) links: [Link; LINKS_MAX],
@@ -51,9 +51,9 @@ pub(super) struct Chain {
 #[derive(Clone, Copy)]
 pub(super) struct Least {
     pub(super) depth: f64,
-    /// Unit, outward: along which it is so much.
+    /// Unit, outward: the direction of this distance.
     pub(super) n: Flat,
-    /// The link above.
+    /// Index of the upper link.
     pub(super) place: usize,
 }
 
@@ -76,7 +76,7 @@ impl Chain {
         &self.links[..self.count]
     }
 
-    /// The next one from the top; of equally high ones the one farther out stays, and what is not lower is left out.
+    /// Adds the next one from the top; of equally high ones the outermost stays, and one that is not lower is left out.
     pub(super) fn push(&mut self, link: Link, along: &Vec3) {
         if let Some(last) = self.links[..self.count].last_mut() {
             match link.height().partial_cmp(&last.height()) {
@@ -91,7 +91,7 @@ impl Chain {
         self.insert(self.count, link);
     }
 
-    /// False where there is no room, or it is not between its neighbours.
+    /// False if there is no room, or it is not between its neighbours.
     pub(super) fn insert(&mut self, place: usize, link: Link) -> bool {
         let above = place == 0 || self.links[place - 1].height() > link.height();
         let below = place == self.count || self.links[place].height() < link.height();
@@ -104,7 +104,7 @@ impl Chain {
         fits
     }
 
-    /// The least of the top, the bottom, and the lines from each link to the next, in one plane.
+    /// The least of the top, the bottom, and the lines between successive links, in one plane.
     pub(super) fn least(&self, along: &Vec3) -> Least {
         let mut least = self.ends();
         for (k, [p, q]) in self.couples() {
@@ -114,17 +114,17 @@ impl Chain {
         least
     }
 
-    /// What it proves of all planes of a sector.
+    /// What it proves for all planes of a sector.
     ///
-    /// * `middle`, `ends` - directions square to the axis.
+    /// * `middle`, `ends` - directions orthogonal to the axis.
     /// * `width` - the angle between the ends.
-    /// * returns - also which end the least is at.
+    /// * returns - also the end at which the least occurs.
     pub(super) fn bound(&self, middle: &Vec3, ends: &[Vec3; 2], width: f64) -> (Least, usize) {
         let part = width * width / 8.0;
         let place = |link: &Link| {
             let off = link.of_other.x.hypot(link.of_other.y);
             let [one, other] = ends.each_ref().map(|along| link.at(along));
-            // It bends towards the axis: a chord is above it only beyond the axis.
+            // It bends towards the axis: a chord overestimates it only beyond the axis.
             let beyond = off * part - (one[0].min(other[0]) - link.corner[0]);
             let lost = part * beyond.clamp(0.0, off);
             [one, other].map(|[x, z]| [x - lost, z])
@@ -132,7 +132,7 @@ impl Chain {
         let (mut least, mut end) = (self.ends(), 0);
         for (k, [p, q]) in self.couples() {
             let (at_p, at_q) = (place(p), place(q));
-            // Any direction that does for both at both ends does in between, too.
+            // A direction that is good enough for both links at both ends is so in between, too.
             let (n, _) = line(p.at(middle), q.at(middle));
             let by_one = [0, 1].map(|end| dot(at_p[end], n).min(dot(at_q[end], n)));
             let fixed = by_one[0].min(by_one[1]);
@@ -168,7 +168,7 @@ impl Chain {
         least
     }
 
-    /// Each link with the next.
+    /// Each link with its successor.
     fn couples(&self) -> impl Iterator<Item = (usize, [&Link; 2])> {
         let next = self.links().iter().skip(1);
         let couples = self.links().iter().zip(next);
@@ -178,14 +178,14 @@ impl Chain {
 
 /// The unit normal of the line from a point to a lower one, outward, and its distance from the origin.
 fn line(p: Flat, q: Flat) -> (Flat, f64) {
-    // Differences first: of points close to each other they are exact.
+    // Differences first: for points close to each other they are exact.
     let across = [p[1] - q[1], q[0] - p[0]];
     let length = across[0].hypot(across[1]);
     let n = across.map(|x| x / length);
     (n, dot(p, n))
 }
 
-/// The direction square to the axis at an angle.
+/// The direction orthogonal to the axis at an angle.
 pub(super) fn along(angle: f64) -> Vec3 {
     let (sin, cos) = angle.sin_cos();
     Vec3::new(cos, sin, 0.0)

@@ -1,4 +1,4 @@
-//! Bounds of sectors, against directions within them; whole gaps, against directions anywhere.
+//! Bounds of sectors compared with directions within them; whole gaps compared with any directions.
 
 use super::*;
 use crate::builtin::Random;
@@ -6,7 +6,7 @@ use crate::math::{Point, Pose, Quat};
 use crate::narrow::exact::{Warm, convex_gap};
 use crate::shape::Convex;
 
-/// A round shape of size 1 and another that is smaller, with their pose.
+/// A round shape of size 1 and a smaller one, with their pose.
 fn couple(random: &mut Random, small: f64) -> (Convex, Convex, Pose) {
     let mut size = |of: f64| of * 10.0_f64.powf(-random.unit());
     let sizes = [size(1.0), size(1.0), size(small), size(small), size(small)];
@@ -130,7 +130,7 @@ fn bug_what_lies_near_the_axis_of_a_drum_was_known_to_a_thousandth() {
     assert!(loose * 200 <= asked, "{loose} of {asked} are loose");
 }
 
-/// A prism of so many sides, upright.
+/// An upright prism with this many sides.
 fn prism(sides: u32) -> Convex {
     let corners = (0..2 * sides).map(|k| {
         let at = along(f64::from(k % sides) * 2.0 * PI / f64::from(sides)) * 0.015;
@@ -139,7 +139,7 @@ fn prism(sides: u32) -> Convex {
     Convex::hull(&corners.collect::<Vec<_>>()).unwrap()
 }
 
-/// 512 sides took five thousand looks at a thousand points, twice, and proved nothing that a polytope does not tell.
+/// 512 sides took five thousand looks at a thousand points, twice, and proved nothing that a polytope does not.
 #[test]
 fn bug_prisms_of_many_sides_are_proved_or_left_alone() {
     let drum = Convex::cylinder(1.0, 1.0);

@@ -1,12 +1,12 @@
-//! What a front covers, leaf by leaf: the check of its invariant.
+//! What a front covers, leaf by leaf: a check of its invariant.
 
 use super::{CarriedFront, FrontStore, Side};
 use crate::narrow::cover::lanes;
 use crate::shape::{BoxId, Held, Shape};
 
 impl CarriedFront {
-    /// Every pair of leaves (triangles; 0 for a convex shape) that an entry covers, sorted: each pair of the two once
-    /// and only once, whatever was done before. `None` where some were lumped together for want of room.
+    /// Every pair of leaves (triangles; 0 for a convex shape) that an entry covers, sorted: each pair of the two
+    /// exactly once, at any time. `None` if some were lumped together because there was no room.
     #[must_use]
     pub fn covered(&self, store: &FrontStore, a: &Shape, b: &Shape) -> Option<Vec<(u32, u32)>> {
         let (side_a, side_b) = (Side::of(a)?, Side::of(b)?);

@@ -1,11 +1,10 @@
-//! How deep two overlap whose leaves only just touch.
+//! The depth of an overlap whose leaves barely touch.
 //!
-//! Solids pushed into one another along faces that are in line cross nowhere: their leaves prove a touch within
-//! rounding, and no overlap. So a touch that is no more is followed by a look at the balls within the two and at points
-//! of what their boxes share, and then by a search that goes on for a bounded number of steps, to leaves that cross, or
-//! the middle of one of which lies deep in the other solid, or that are in line and face one way, so that both solids
-//! are behind them. What then is no overlap still touches: of 4,800 pairs of solids made of cubes in line, at random,
-//! one that overlaps.
+//! Solids pushed into one another along coplanar faces cross nowhere: their leaves prove a touch within rounding, and
+//! no overlap. So a bare touch is followed by a test of inner balls and of points in the boxes' intersection, and then
+//! by a longer search of a bounded number of steps, for leaves that cross, or whose middle lies deep in the other
+//! solid, or that are coplanar and face the same way, so that both solids are behind them. If no overlap is proved
+//! then, the pair still counts as touching: of 4,800 random pairs of solids made of aligned cubes, one that overlaps.
 
 use super::{CarriedFront, Search, Side};
 use crate::math::{Point, ROUND, Vec3};
@@ -15,38 +14,38 @@ use crate::narrow::mesh::triangle::edges;
 use crate::shape::{Mesh, Shape};
 use crate::time::Meter;
 
-/// Points of what the two boxes share: its middle, and those of its eight parts.
+/// Points in the intersection of the two boxes: its middle, and those of its eight parts.
 const POINTS: u32 = 9;
-/// Steps of the search that goes on, at most.
+/// Most steps of the longer search.
 const STEPS_MAX: u32 = 64;
-/// Leaves the middles of which are looked at, at most.
+/// Most leaves whose middles are tested.
 const PROBES_MAX: u32 = 16;
-/// Boxes of a mesh that a look at one point goes into, at most: so many to tell whether it is inside, and so many to
-/// tell how deep. With fewer, more depths stay unknown; with more, it is longer until the clock is read.
+/// Most boxes of a mesh visited per point: this many to decide whether it is inside, and this many to measure how deep.
+/// Fewer leave more depths unknown; more delay the next read of the clock.
 const BOXES_MAX: usize = 256;
-/// What a look at a point costs, in tests of a box against a pack, which say when the clock is to be read again.
+/// Cost of testing a point, in tests of a box against a pack: decides when the clock is read.
 const PROBE_COST: u64 = 16;
-/// Leaves are in line below this sine: the middle of neither lies deep in the other. Where they face one way, both
-/// solids are behind them.
+/// Leaves count as coplanar below this sine: the middle of neither lies deep in the other. If they face the same way,
+/// both solids are behind them.
 const IN_LINE: f64 = 1e-6;
-/// How far behind two leaves in line it is looked for what both solids hold, as a share of the smaller one's size (the
+/// How far behind two coplanar leaves a point inside both solids is searched, as a share of the smaller one's size (the
 /// root of twice its area).
 const BELOW: f64 = 0.1;
-/// After a search in vain the next is made where the two have moved by this share of the smaller one's radius.
+/// After a failed search the next one runs once the two have moved by this share of the smaller one's radius.
 const VAIN: f64 = 1e-4;
 
-/// What was done about it at a pose.
+/// Work done at a pose.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Fathomed {
     points: u32,
     steps: u32,
     probes: u32,
-    /// By side, and by the triangle's number modulo 64: those the middles of which were looked at.
+    /// By side, a bit per triangle number modulo 64: leaves whose middles were tested.
     asked: [u64; 2],
 }
 
 impl Fathomed {
-    /// Whether the middles of two leaves were not looked at yet; from now on they were.
+    /// Whether the middles of two leaves were not tested yet; marks them as tested.
     fn is_new(&mut self, places: [u32; 2]) -> [bool; 2] {
         let bits = places.map(|place| 1 << (place % 64));
         let is_new = [0, 1].map(|k| self.asked[k] & bits[k] == 0);
@@ -59,26 +58,26 @@ impl Fathomed {
 }
 
 impl CarriedFront {
-    /// Whether solids are known to touch, and not to overlap.
+    /// Whether solids are known to touch, but not known to overlap.
     fn only_touches(&self) -> bool {
         self.solids && self.known.touches && self.known.high > 0.0
     }
 
-    /// Whether it is still looked for how deep they overlap.
+    /// Whether the depth of their overlap is still being searched.
     pub(super) fn is_fathoming(&self) -> bool {
         let done = &self.known.fathomed;
         let more = || !self.cover.open.is_empty() || self.cover.has_expired();
         self.only_touches() && (done.points < POINTS || (done.steps < STEPS_MAX && more()))
     }
 
-    /// Asks the balls within the two and one point between them, and then each time another point; false: it is not
-    /// their turn.
+    /// Tests inner balls and one point between the two, and in later calls one more point each; false: it is not their
+    /// turn.
     pub(super) fn fathom(&mut self, (a, b): (&Shape, &Shape), meter: &mut Meter<'_>) -> bool {
         let place = self.known.fathomed.points;
         if !self.only_touches() || place == POINTS {
             return false;
         }
-        // Of no other shape it is known how deep a point is: one unit is enough to see that.
+        // For other shapes the depth of a point is not known: one unit is enough to see that.
         let tells = |shape: &Shape| {
             (shape.mesh()).is_some_and(|mesh| mesh.is_solid() && !mesh.is_deforming())
         };
@@ -108,7 +107,7 @@ impl CarriedFront {
         true
     }
 
-    /// The same of a point of what the boxes around the two share, where it lies in both.
+    /// The depth at one point of the boxes' intersection, if it lies in both.
     fn depth_between(&self, (a, b): (&Shape, &Shape), place: u32) -> Option<f64> {
         let (one, other) = (a.mesh()?, b.mesh()?);
         let middle_b = self.at.to_a(&b.aabb.centre());
@@ -123,20 +122,20 @@ impl CarriedFront {
         self.depth_at([one, other], &point)
     }
 
-    /// The same of a point, A's frame.
+    /// The depth at a point, A's frame.
     fn depth_at(&self, [a, b]: [&Mesh; 2], point: &Point) -> Option<f64> {
         let in_a = a.depth_of(point, BOXES_MAX)?;
         let in_b = b.depth_of(&self.at.to_b(point), BOXES_MAX)?;
         self.certain_depth(in_a.max(in_b))
     }
 
-    /// Less what is rounded between the two.
+    /// The depth less the rounding between the two.
     fn certain_depth(&self, depth_m: f64) -> Option<f64> {
         let least_m = depth_m * (1.0 - 8.0 * ROUND) - 2.0 * self.at.slop;
         (least_m > 0.0).then_some(least_m)
     }
 
-    /// Counts a step of the search that goes on.
+    /// Counts a step of the longer search.
     pub(super) fn note_fathoming(&mut self, (a, b): (Side<'_>, Side<'_>)) {
         if !self.only_touches() || self.known.fathomed.steps >= STEPS_MAX {
             return;
@@ -148,7 +147,7 @@ impl CarriedFront {
         }
     }
 
-    /// Looks whether the middle of one of two leaves that touch lies deep in the other solid.
+    /// Tests whether the middle of one of two touching leaves lies deep in the other solid.
     pub(super) fn fathom_at(
         &mut self,
         places: [u32; 2],

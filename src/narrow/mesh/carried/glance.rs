@@ -1,5 +1,5 @@
-//! What is told of a pair as two wholes, without a look into its front: a plane that parts the two, or balls within
-//! them that overlap.
+//! What can be said of two whole shapes without opening the front: a plane that separates them, or inner balls that
+//! overlap.
 
 use super::{CarriedFront, Search};
 use crate::math::Pose;
@@ -7,8 +7,8 @@ use crate::shape::Shape;
 use crate::time::Meter;
 
 impl CarriedFront {
-    /// A lower bound on the gap at a pose, of a plane that parts the two as wholes; `None`: none was found. What is
-    /// proved of the pair stays as it is, at the pose it is at. One unit at most.
+    /// A lower bound on the gap at a pose, from a plane that separates the two; `None`: none was found. The pair's
+    /// proofs and the front's pose are unchanged. One unit at most.
     pub fn parted(
         &mut self,
         a: &Shape,
@@ -20,8 +20,8 @@ impl CarriedFront {
         is_carried.then(|| self.parting.low(a, b, pos12, meter))?
     }
 
-    /// A lower bound on the depth of the overlap at a pose, of balls within the two; `None`: they do not tell. What is
-    /// proved of the pair stays as it is, at the pose it is at. One unit at most.
+    /// A lower bound on the depth of the overlap at a pose, from balls within the two; `None`: they do not overlap
+    /// enough. The pair's proofs and the front's pose are unchanged. One unit at most.
     pub fn overlap(
         &mut self,
         a: &Shape,

@@ -1,11 +1,11 @@
-//! What a front knows of the pair at the pose it is at.
+//! What a front knows of the pair at its pose.
 
 use super::fathom::Fathomed;
 use super::store::FrontStore;
 use super::{CarriedFront, Containment, Goal, LeafContact};
 use crate::math::Interval;
 
-/// What is known at the pose worked at.
+/// What is known at the current pose.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Known {
     /// Least lower end of the leaves queried, and least upper end, metres.
@@ -14,19 +14,19 @@ pub(super) struct Known {
     pub(super) touches: bool,
     /// A leaf query near zero could not be finished.
     pub(super) blurred: bool,
-    /// Contact points are made of leaves that touch: a verdict needs none.
+    /// Contact points are to be made of leaves that touch: a verdict needs none.
     pub(super) points_wanted: bool,
-    /// The last leaves have been asked at this pose.
+    /// The last leaves have been queried at this pose.
     pub(super) asked_last: bool,
-    /// A walk has set out from leaves that do not touch.
+    /// A walk was started from leaves that do not touch.
     pub(super) sought: bool,
-    /// Bounds of the wholes at this pose, when they were asked for.
+    /// Bound on the gap of the whole shapes at this pose, if it was computed.
     pub(super) floor_m: f64,
-    /// The search for contact points that is going on, by its number.
+    /// The number of the contact point search in progress.
     pub(super) walks: Option<u64>,
-    /// Times that the points of the last leaves were cut off.
+    /// How often the search for the points of the last leaves was cut off.
     pub(super) cuts: u32,
-    /// What was done to learn how deep leaves overlap that only just touch.
+    /// Work done to find the depth of leaves that barely touch.
     pub(super) fathomed: Fathomed,
 }
 
@@ -49,7 +49,7 @@ impl Default for Known {
 }
 
 impl CarriedFront {
-    /// What is known of the gap at this pose, metres: sound at any interruption.
+    /// Interval of the gap at this pose, metres: sound at any interruption.
     #[must_use]
     pub fn interval(&self) -> Interval {
         let high = self.known.high;
@@ -69,8 +69,8 @@ impl CarriedFront {
         self.known.touches || (self.cover.holds_lumped() && !self.known.blurred)
     }
 
-    /// Whether the deepest of the leaves that touch does so also where no point is farther than `off_m` from its place;
-    /// false says nothing.
+    /// Whether the deepest of the touching leaves still touches if points are displaced by up to `off_m`; false proves
+    /// nothing.
     pub(in crate::narrow::mesh) fn touches_despite(&self, off_m: f64) -> bool {
         let Some(leaf) = self.witness.filter(|_| self.known.touches) else {
             return false;
@@ -79,11 +79,11 @@ impl CarriedFront {
         if leaf.triangle_a == u32::MAX || leaf.triangle_b == u32::MAX {
             return found.gap.max + off_m < 0.0;
         }
-        // Of triangles that cross the depth is known, and no upper end tells it.
+        // For crossing triangles the depth is known, but no upper end shows it.
         -found.best_m > 4.0 * (off_m + self.at.slop)
     }
 
-    /// The leaves with the least gap met at this pose; where one shape is within the other, with the normal that leads
+    /// The leaves with the least gap found at this pose; if one shape is within the other, with the normal that leads
     /// out.
     #[must_use]
     pub fn witness(&self) -> Option<LeafContact> {
@@ -96,15 +96,14 @@ impl CarriedFront {
         (-witness.closest.best_m >= gap.min).then(|| witness.way_out(gap))
     }
 
-    /// Points where leaves touch at this pose, [`crate::narrow::mesh::PATCH_POINTS`] of each patch, some twice: none
-    /// until `Goal::Contacts` is asked for, those of all leaves once it is reached.
+    /// Points where leaves touch at this pose, [`crate::narrow::mesh::PATCH_POINTS`] of each patch, with duplicates:
+    /// none until `Goal::Contacts` is wanted, those of all leaves once it is reached.
     #[must_use]
     pub fn contacts<'a>(&self, store: &'a FrontStore) -> &'a [LeafContact] {
         self.contacts.all(&store.contacts)
     }
 
-    /// Where one shape is within the other and nothing touches: the leaves that lead out, which then stand for
-    /// contacts.
+    /// If one shape is within the other and nothing touches: the leaves that lead out, which then replace contacts.
     #[must_use]
     pub fn way_out(&self, store: &FrontStore) -> Option<LeafContact> {
         let within = self.contacts(store).is_empty() && self.interval().max <= 0.0;
@@ -122,7 +121,7 @@ impl CarriedFront {
         self.cover.low_m().min(self.known.high)
     }
 
-    /// What is known of it at this pose.
+    /// Whether one lies within the other, as far as known at this pose.
     pub(super) fn containment(&self) -> Containment {
         if self.known.touches {
             return Containment::Outside;
@@ -143,7 +142,7 @@ impl CarriedFront {
         }
         match self.shells.state() {
             Containment::Open => false,
-            // The nearest points lead out: only a contact set wants them.
+            // The nearest points lead out: only a contact set needs them.
             Containment::Inside if goal < Goal::Contacts => true,
             _ => {
                 goal == Goal::Verdict
@@ -152,7 +151,7 @@ impl CarriedFront {
         }
     }
 
-    /// What cannot be told apart at this pose, metres.
+    /// Gaps closer than this cannot be distinguished at this pose, metres.
     fn fuzz_m(&self) -> f64 {
         self.at.slop + self.cover.fuzz_m()
     }

@@ -9,23 +9,22 @@ use crate::narrow::mesh::{manifold, side};
 use crate::shape::{Held, Obb};
 use crate::time::Meter;
 
-/// What a proof that two leaves are apart costs, in tests of a box against a pack, which say when the clock is to be
-/// read again.
+/// Cost of a proof that two leaves are apart, in tests of a box against a pack: decides when the clock is read.
 const PROOF_COST: u64 = 4;
-/// What the distance of two leaves costs, in tests of a box against a pack: told too low, a deadline is passed by more;
-/// too high, the clock is read more often than need be. Contact points look at the clock themselves.
+/// Cost of the distance of two leaves, in tests of a box against a pack: too low, a deadline is missed by more; too
+/// high, the clock is read more often than needed. Contact points read the clock themselves.
 pub(super) const LEAF_COST: u64 = 16;
-/// Every so many times that walks for contact points ask whether to go on the clock is read: at each, being stoppable
-/// costs a contact set 6 % (`benches/time_critical`).
+/// Walks for contact points read the clock at every `ASKS_PER_READ`th check: at each, being interruptible costs a
+/// contact set 6 % (`benches/time_critical`).
 const ASKS_PER_READ: u32 = 2;
-/// So often the points of two leaves are cut off in a row; in the end they are asked for whatever it takes.
+/// How often in a row the points of two leaves may be cut off; after that they are computed whatever it takes.
 const CUTS_MAX: u32 = 8;
 
 impl CarriedFront {
     /// Queries two leaves.
     ///
     /// * `known_m` - a bound on their gap that holds at this pose.
-    /// * `exact` - their distance is wanted; else any proof that they are apart will do.
+    /// * `exact` - their distance is wanted; otherwise any proof that they are apart is enough.
     pub(super) fn leaves(
         &mut self,
         store: &mut FrontStore,
@@ -39,13 +38,13 @@ impl CarriedFront {
             return meter.charge_weighted(1, PROOF_COST);
         };
         let (leaf_a, leaf_b) = ((a, i), (b, j));
-        // Once the pair touches, only what touches too is of interest.
+        // Once the pair touches, only leaves that touch too matter.
         let exact = exact && !self.known.touches;
         let beyond_m = if exact { self.known.high.max(0.0) } else { 0.0 };
         let closest = match side::leaf(leaf_a, leaf_b, &self.at, beyond_m) {
             Ok(closest) => closest,
             Err(gap) => {
-                // Farther than the nearest known: that is proof enough.
+                // Farther than the nearest known pair: that is proof enough.
                 self.keep_leaf(store, id_a, id_b, gap.max(known_m));
                 return meter.charge_weighted(1, PROOF_COST);
             }
@@ -64,7 +63,7 @@ impl CarriedFront {
             return meter.charge_weighted(1, LEAF_COST);
         }
         let mut whole = true;
-        // Certified, or zero within its rounding: touching collides.
+        // Certified, or zero within rounding: touching counts as colliding.
         if closest.gap.max <= 8.0 * self.at.slop || closest.finished {
             let deeper = |w: &LeafContact| closest.best_m < w.closest.best_m;
             if !self.known.touches || self.witness.as_ref().is_none_or(deeper) {
@@ -96,7 +95,7 @@ impl CarriedFront {
             self.known.cuts = 0;
             self.cover.touch(&mut store.entries, touching);
         } else {
-            // It is to be asked for its points again.
+            // It must be queried for its points again.
             self.known.cuts += 1;
             self.cover.look_into(&mut store.entries, touching);
         }
@@ -105,8 +104,8 @@ impl CarriedFront {
 
     /// The upper bound on the gap that a query of two leaves proves, metres.
     pub(super) fn high_of(&self, closest: &Closest) -> f64 {
-        // A solid's depth is that of a point, and the translation that parts two leaves can be more: of an overlap
-        // their query proves no more than that it is one.
+        // A solid's depth is that of a point, and the translation that separates two leaves can be more: their query
+        // proves an overlap, but not its depth.
         let least = if self.solids { 0.0 } else { f64::NEG_INFINITY };
         closest.gap.max.max(least)
     }
@@ -129,7 +128,7 @@ pub(super) fn contact(a: (Side<'_>, u32), b: (Side<'_>, u32), closest: Closest) 
 }
 
 impl LeafContact {
-    /// Of surfaces that are apart though one shape is within the other: moving B towards A's nearest point leads out.
+    /// For surfaces that are apart while one shape is within the other: moving B towards A's nearest point leads out.
     pub(in crate::narrow::mesh) fn way_out(&self, gap: Interval) -> Self {
         let found = self.closest;
         let closest = Closest {
@@ -151,7 +150,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// The boxes that share a parent.
+    /// The pack of boxes that share a parent.
     pub(in crate::narrow::mesh) fn pack(self, pack: u32) -> Option<&'a crate::shape::ObbPack> {
         match self {
             Self::Mesh(mesh) => mesh.obb().packs().get(pack as usize),
@@ -159,7 +158,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// A box by itself; that of a convex shape is handed in.
+    /// A single box; that of a convex shape is passed in.
     pub(in crate::narrow::mesh) fn obb(self, id: BoxId, whole: &Option<Obb>) -> Obb {
         match (self, whole) {
             (Self::Mesh(mesh), _) => mesh.obb().get(id),
@@ -168,7 +167,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// How large a box is, to be compared with another: the sum of its half sides' squares, square metres.
+    /// Size of a box for comparisons: the sum of its half sides' squares, square metres.
     pub(in crate::narrow::mesh) fn size(self, id: BoxId, whole: &Option<Obb>) -> f32 {
         match (self, whole) {
             (Self::Mesh(mesh), _) => {
@@ -181,7 +180,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// How contacts name a leaf: a convex shape has no triangles.
+    /// Name of a leaf in contacts: a convex shape has no triangles.
     fn triangle_name(self, i: u32) -> u32 {
         match self {
             Self::Mesh(_) => i,
@@ -190,7 +189,7 @@ impl<'a> Side<'a> {
     }
 }
 
-/// Whether the meter is open; the clock is read at every so many questions.
+/// Whether the meter is open; the clock is read only at every few checks.
 #[inline]
 fn goes_on(meter: &mut Meter<'_>, asks: &mut u32) -> bool {
     *asks += 1;

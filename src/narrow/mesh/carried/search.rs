@@ -38,11 +38,11 @@ impl CarriedFront {
         self.note_apart();
     }
 
-    /// Where the surfaces are apart, what is known of the insides, and what is asked of them at this pose, holds as
-    /// long as they stay so.
+    /// If the surfaces are apart, what is known of the insides, and what is tested of them at this pose, holds as long
+    /// as they stay apart.
     fn note_apart(&mut self) {
         if self.known.touches {
-            // Whatever the next pose is, insides must be asked again.
+            // At the next pose, whatever it is, the insides must be tested again.
             self.shells_expiry_m = f64::NEG_INFINITY;
             return;
         }
@@ -55,7 +55,7 @@ impl CarriedFront {
         self.shells_expiry_m = self.shells_expiry_m.max(expiry_m);
     }
 
-    /// The leaves that were nearest last are near still: their distance spares most others the question.
+    /// The leaves that were nearest last are probably near still: their distance rules out most others.
     fn bound_by_last(&mut self, a: Side<'_>, b: Side<'_>) {
         let Some((leaf_a, leaf_b)) = self.last else {
             return;
@@ -63,7 +63,7 @@ impl CarriedFront {
         if let (Held::Triangle(i), Held::Triangle(j)) = (a.held(leaf_a), b.held(leaf_b))
             && let Ok(closest) = side::leaf((a, i), (b, j), &self.at, f64::INFINITY)
         {
-            // No more than the distance of two points: what else it says is said when its entry's turn comes.
+            // Only as the distance of two points: the rest of the result is used when its entry's turn comes.
             self.known.high = self.known.high.min(closest.gap.max.max(0.0));
             self.witness = Some(contact((a, i), (b, j), closest));
         }
@@ -93,7 +93,7 @@ impl CarriedFront {
         meter.charge(1);
     }
 
-    /// The box that stays and the pack that takes the other's place: the larger is parted, so that both shrink alike.
+    /// The box that is kept and the pack that replaces the other: the larger is split, so that both shrink alike.
     fn children(
         &self,
         (id_a, held_a): (BoxId, Held),
@@ -123,7 +123,7 @@ impl CarriedFront {
 
     /// Tests a group at this pose.
     ///
-    /// * `known_m` - a bound that holds for all of it at this pose.
+    /// * `known_m` - a bound that holds for the whole group at this pose.
     fn test(
         &mut self,
         store: &mut FrontStore,
@@ -153,7 +153,7 @@ impl CarriedFront {
         }
     }
 
-    /// Looks into the nearest of all groups: best first.
+    /// Opens the nearest of all groups: best first.
     fn refine(
         &mut self,
         store: &mut FrontStore,
@@ -163,7 +163,7 @@ impl CarriedFront {
         let Some(group) = self.cover.proved.pop(&mut store.entries.groups) else {
             return;
         };
-        // What is stored holds at this pose; a new test may be lower by rounding.
+        // The stored bound holds at this pose; a new test may be lower by rounding.
         let known_m = self.cover.drift.left_m(group.expiry_m);
         if group.leaf {
             let pair = group.pair(group.mask.trailing_zeros());

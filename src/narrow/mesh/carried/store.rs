@@ -1,5 +1,5 @@
-//! Where the fronts of all pairs keep their entries: three arenas of blocks, so that a tick at constant scene allocates
-//! nothing and what ended pairs gave back serves the others.
+//! Storage for the entries of all fronts: three arenas of blocks, so that a tick at constant scene allocates nothing
+//! and memory released by ended pairs serves the others.
 
 use crate::narrow::arena::Arena;
 use crate::narrow::cover::{Cover, Entries};
@@ -8,11 +8,11 @@ use crate::narrow::mesh::LeafContact;
 use crate::narrow::mesh::manifold::Walks;
 use crate::time::Meter;
 
-/// Groups of all fronts together, 24 bytes each: some 10,000 pairs of 20,000-triangle meshes. Beyond it what is proved
-/// apart is lumped together, pair by pair.
+/// Groups of all fronts together, 24 bytes each: some 10,000 pairs of 20,000-triangle meshes. Beyond it, proofs are
+/// lumped together, pair by pair.
 const GROUPS_MAX: usize = 1 << 22;
-/// Open pairs of boxes of all fronts together, 16 bytes each; depth first has some hundred a pair. A pair that finds no
-/// room is not decided in this tick and starts anew in the next.
+/// Open pairs of boxes of all fronts together, 16 bytes each; depth first needs some hundred per pair. A pair that
+/// finds no room is not decided in this tick and starts again in the next.
 const OPEN_MAX: usize = 1 << 24;
 /// Contacts of leaves of all fronts together, some 200 bytes each; beyond it a pair keeps the deepest of what it has.
 const CONTACTS_MAX: usize = 1 << 20;
@@ -21,7 +21,7 @@ const CONTACTS_MAX: usize = 1 << 20;
 pub struct FrontStore {
     pub(in crate::narrow) entries: Entries,
     pub(in crate::narrow::mesh) contacts: Arena<LeafContact>,
-    /// Of the search that is going on.
+    /// Of the search in progress.
     pub(super) walks: Walks,
 }
 
@@ -32,7 +32,7 @@ impl Default for FrontStore {
 }
 
 impl FrontStore {
-    /// A store that holds at most so many groups and so many open pairs of all fronts.
+    /// A store for at most this many groups and open pairs of all fronts.
     #[must_use]
     pub fn with_room(groups: usize, open: usize) -> Self {
         Self {
@@ -42,7 +42,7 @@ impl FrontStore {
         }
     }
 
-    /// Has memory at hand for what the next work will keep.
+    /// Touches memory ahead for what the next work will store.
     pub(in crate::narrow) fn touch_ahead(&mut self, meter: &mut Meter<'_>) {
         self.entries.touch_ahead(meter);
         self.contacts.touch_ahead(meter);
@@ -51,7 +51,7 @@ impl FrontStore {
     /// Structure check of the arenas, and of each front's entries in them.
     ///
     /// # Errors
-    /// The first thing that does not hold, in words.
+    /// The first violation, in words.
     pub(in crate::narrow) fn validate(&self, held: &Holdings<'_>) -> Result<(), String> {
         let covers = held.covers.iter();
         let groups: Vec<_> = covers.clone().flat_map(|c| c.runs_of_groups()).collect();

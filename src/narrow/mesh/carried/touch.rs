@@ -1,11 +1,11 @@
-//! The triangles that touched last, asked again at another pose; where they have parted, a walk to where the surfaces
+//! The triangles that touched last, retested at another pose; if they have separated, a walk to where the surfaces
 //! cross now.
 //!
-//! Two surfaces that go on touching do so along a curve, which moves over a triangle's edge into the next: a walk over
-//! both from the two that touched last comes to the curve in a few steps, where a search from boxes takes twenty units.
-//! At 0.5 % of the diameter a tick 1,440 units for all verdicts in place of 2,000, at 2 % 2,100 in place of 4,070
-//! (`benches/time_critical`). Refused: to set out from boxes of a search that has not come to leaves yet, or from the
-//! points that reach farthest out. They are too far from the curve; most such walks are in vain.
+//! Two surfaces that stay in touch do so along a curve, which moves over a triangle's edge into the next: a walk over
+//! both from the two that touched last reaches the curve in a few steps, where a search from boxes takes twenty units.
+//! At 0.5 % of the diameter a tick 1,440 units for all verdicts instead of 2,000, at 2 % 2,100 instead of 4,070
+//! (`benches/time_critical`). Refused: starting from boxes of a search that has not reached leaves yet, or from the
+//! points that reach farthest out: they are too far from the curve, and most such walks fail.
 
 use super::leaves::contact;
 use super::{CarriedFront, LeafContact, Search};
@@ -18,29 +18,29 @@ use crate::narrow::mesh::way::{Way, way};
 use crate::shape::{Mesh, Shape};
 use crate::time::Meter;
 
-/// Steps of a walk, from one touch to the next. With 8, 16 and 24 at 2 % of the diameter a tick it takes 2,140, 2,160
-/// and 2,180 units, with 12 it takes 2,100.
+/// Most steps of a walk from one touch to the next. At 2 % of the diameter a tick, 8, 16 and 24 steps take 2,140, 2,160
+/// and 2,180 units; 12 take 2,100.
 const STEPS_MAX: usize = 12;
 
 /// The triangles that touched last.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Crossing {
     places: [u32; 2],
-    /// Each in its own frame: to ask them again costs no look into a mesh that does not deform.
+    /// Each in its own frame: retesting them needs no access to a mesh that does not deform.
     corners: [Triangle; 2],
-    /// Where the walk from them stands: one that was cut off goes on.
+    /// The walk's present position: an interrupted walk continues.
     reached: [u32; 2],
     steps: usize,
 }
 
 impl CarriedFront {
-    /// Whether it is known where they touched last; after a walk in vain it is not.
+    /// Whether the place of the last touch is known; after a failed walk it is not.
     pub(in crate::narrow) fn knows_touch(&self) -> bool {
         self.crossing.is_some()
     }
 
-    /// Whether the leaves that touched last are certain to touch at a pose; nothing else is looked at. Where they are,
-    /// a walk from them that was cut off is no more to be gone on with.
+    /// Whether the leaves that touched last surely touch at a pose; nothing else is tested. If so, an interrupted walk
+    /// from them is dropped.
     ///
     /// * `off_m` - how far B may be from that pose, metres.
     #[must_use]
@@ -60,11 +60,11 @@ impl CarriedFront {
         touches
     }
 
-    /// Leaves that are certain to touch at a pose, found by a walk from those that touched last and do not any more:
-    /// they are the ones to be asked next time. After a walk in vain it is forgotten where the two touched, so that no
-    /// pair spends a small budget on it for ever; nothing else is changed. Units: a step each.
+    /// Leaves that surely touch at a pose, found by a walk from those that touched last and no longer do; they are the
+    /// ones to be retested next time. After a failed walk the place of touch is forgotten, so that no pair spends a
+    /// small budget on it for ever; nothing else is changed. Units: one per step.
     ///
-    /// * `off_m` - as [`CarriedFront::still_touches`] has it.
+    /// * `off_m` - as in [`CarriedFront::still_touches`].
     pub fn touches_beside(
         &mut self,
         a: &Shape,
@@ -85,9 +85,9 @@ impl CarriedFront {
         walked.found()
     }
 
-    /// A walk from two leaves that do not touch, once a pose; where it comes to leaves that do, the two touch.
+    /// A walk from two leaves that do not touch, once per pose; if it reaches leaves that do, the pair touches.
     ///
-    /// What it finds is under an entry that is open or has expired, as all that touches is, and stays there.
+    /// The leaves it finds are below an entry that is open or expired, as all touching leaves are, and stay there.
     pub(super) fn seek(
         &mut self,
         places: [u32; 2],
@@ -111,7 +111,7 @@ impl CarriedFront {
     }
 }
 
-/// Two shapes at a pose that B may be `off_m` from.
+/// Two shapes at a pose that B may be off by `off_m`.
 fn placed((a, b): (&Shape, &Shape), pos12: &Pose, off_m: f64) -> Placed {
     let at = Placed::new(pos12, reach_of(a), reach_of(b));
     Placed {
@@ -120,13 +120,13 @@ fn placed((a, b): (&Shape, &Shape), pos12: &Pose, off_m: f64) -> Placed {
     }
 }
 
-/// How a walk ended.
+/// The outcome of a walk.
 enum Walked {
     /// At leaves that touch.
     Found(LeafContact),
     /// The meter closed.
     Stopped,
-    /// In vain.
+    /// Without success.
     Nowhere,
 }
 
@@ -150,7 +150,7 @@ impl Crossing {
         }
     }
 
-    /// Goes on over the two surfaces to where they cross. Units: a step each.
+    /// Continues over the two surfaces to where they cross. Units: one per step.
     fn walk(&mut self, meshes: [&Mesh; 2], at: &Placed, meter: &mut Meter<'_>) -> Walked {
         let corners = |k: usize, place: u32| {
             let own = meshes[k].triangle(place);
@@ -190,7 +190,7 @@ impl Crossing {
         Walked::Nowhere
     }
 
-    /// The leaves reached are the ones that touched last from now on.
+    /// The leaves reached become the ones that touched last.
     fn arrive(&mut self, meshes: [&Mesh; 2], at: &Placed) -> Walked {
         let [i, j] = self.reached;
         *self = Self::at([i, j], [meshes[0].triangle(i), meshes[1].triangle(j)]);

@@ -1,4 +1,4 @@
-//! What a front has not proved apart, at whatever pose: where a pair may still touch.
+//! What a front has not proved apart at a given pose: where a pair may still touch.
 
 use super::{CarriedFront, Containment, FrontStore, LeafContact, trees_of};
 use crate::math::Pose;
@@ -8,7 +8,7 @@ use crate::narrow::mesh::placed::moved;
 use crate::shape::{BoxId, Shape};
 
 impl CarriedFront {
-    /// How far the pair is from the pose and the vertices that the front works at, metres, rounded up; 0: it is there.
+    /// Distance of the pair from the front's pose and vertices, metres, rounded up; 0: it is there.
     pub(in crate::narrow) fn moved_m(&self, a: &Shape, b: &Shape, pos12: &Pose) -> f64 {
         let by_pose = if self.at.pos12 == *pos12 {
             0.0
@@ -23,15 +23,15 @@ impl CarriedFront {
         }
     }
 
-    /// Whether the boxes that it names are those of the trees that the shapes have now.
+    /// Whether the boxes that it names belong to the shapes' present trees.
     pub(in crate::narrow::mesh) fn names_boxes_of(&self, a: &Shape, b: &Shape) -> bool {
         self.trees == trees_of(a, b)
     }
 
     /// Visits every pair of boxes that is not proved apart at a pose `moved_m` away from the front's. All that the two
-    /// surfaces share at that pose is under these.
+    /// surfaces share at that pose is below these.
     ///
-    /// * returns - false where some pairs were lumped together and are not known any more: then nothing is visited.
+    /// * returns - false if some pairs were lumped together, so that they are no longer known: then nothing is visited.
     pub(in crate::narrow::mesh) fn unproved(
         &self,
         store: &FrontStore,
@@ -41,7 +41,7 @@ impl CarriedFront {
         self.cover.unproved(&store.entries, moved_m, visit)
     }
 
-    /// Contacts found at the front's own pose if it is there, two of each patch; none elsewhere.
+    /// Contacts found at the front's own pose, two of each patch; none at another pose.
     pub(in crate::narrow) fn found_at<'a>(
         &'a self,
         store: &'a FrontStore,
@@ -53,11 +53,11 @@ impl CarriedFront {
             .flat_map(|patch| patch.iter().take(2))
     }
 
-    /// Whether no surface of the one is known to lie, or can lie, within the other as a whole, at a pose `moved_m` away
+    /// Whether it is proved that no connected surface of one lies entirely within the other, at a pose `moved_m` away
     /// from the front's.
     ///
-    /// * `single` - each has one connected surface: where the two touch at the front's own pose, neither holds the
-    ///   other's. Of several one may touch, and another lie within.
+    /// * `single` - each has one connected surface: if the two touch at the front's own pose, neither contains the
+    ///   other's. Of several surfaces one may touch, and another lie within.
     pub(in crate::narrow::mesh) fn holds_none(&self, moved_m: f64, single: bool) -> bool {
         let outside = self.shells.state() == Containment::Outside
             && self.cover.drift.left_m(self.shells_expiry_m) > moved_m;

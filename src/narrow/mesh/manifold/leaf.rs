@@ -1,4 +1,4 @@
-//! A leaf of a pair: a triangle with the surface about it, or a convex shape; seen from A.
+//! A leaf of a pair: a triangle with its surrounding surface, or a convex shape; seen from A.
 
 use super::{Placed, Side, Walks};
 use crate::math::{Point, Vec3};
@@ -13,7 +13,7 @@ pub(super) struct Leaf<'a> {
     pub(super) at: &'a Placed,
     /// Of a triangle, A's frame.
     pub(super) corners: [Point; 3],
-    /// Of a triangle with an area: unit, outward of a solid, A's frame.
+    /// Of a triangle with non-zero area: unit, outward for a solid, A's frame.
     pub(super) normal: Option<Vec3>,
 }
 
@@ -42,13 +42,13 @@ impl<'a> Leaf<'a> {
         }
     }
 
-    /// The surface that it is part of.
+    /// The surface it belongs to.
     pub(super) fn patch(&self) -> u32 {
         let region = self.mesh().map_or(0, |mesh| mesh.region(self.place));
         region << 1 | u32::from(self.is_b)
     }
 
-    /// A direction of A's frame in its own.
+    /// A direction of A's frame in the leaf's own.
     pub(super) fn turn(&self, direction: &Vec3) -> Vec3 {
         if self.is_b {
             self.at.turn_to_b(direction)
@@ -65,13 +65,13 @@ impl<'a> Leaf<'a> {
         }
     }
 
-    /// Where A's origin lies along a direction of A's frame, seen from its own.
+    /// Coordinate of A's origin along a direction of A's frame, measured from the leaf's own origin.
     pub(super) fn offset(&self, direction: &Vec3) -> f64 {
         direction.dot(&self.in_a(&Point::origin()).coords)
     }
 
-    /// How far the surface about this leaf reaches along a direction, from A's origin, and the vertex of a mesh there;
-    /// `None`: beyond `beyond_m`, or the walk was left off.
+    /// How far the surface around this leaf reaches along a direction, from A's origin, and the mesh vertex there;
+    /// `None`: beyond `beyond_m`, or the walk was stopped.
     pub(super) fn reach(
         &self,
         direction: &Vec3,
@@ -90,8 +90,7 @@ impl<'a> Leaf<'a> {
         Some((height + offset, top))
     }
 
-    /// The same for a normal of the leaf's own: an edge that is one of the surface is not left for higher ground beyond
-    /// it.
+    /// The same for the leaf's own normal: an edge of the surface is not left for higher ground beyond it.
     pub(super) fn own_reach(
         &self,
         direction: &Vec3,
@@ -119,7 +118,7 @@ impl<'a> Leaf<'a> {
         }
     }
 
-    /// As a convex shape in its own frame.
+    /// The leaf as a convex shape in its own frame.
     pub(super) fn convex(&self) -> Convex {
         match self.side {
             Side::Mesh(mesh) => Convex::triangle(mesh.triangle(self.place)),
@@ -127,7 +126,7 @@ impl<'a> Leaf<'a> {
         }
     }
 
-    /// A vertex of it by a corner's place, or that of a convex shape: what no other place of it is called.
+    /// Name of a vertex by its corner's index, or of a convex shape's: unique within the shape.
     pub(super) fn corner_name(&self, corner: u32) -> u64 {
         let name = match self.side {
             Side::Mesh(mesh) => mesh.faces()[self.place as usize]
@@ -138,7 +137,7 @@ impl<'a> Leaf<'a> {
         name << 1 | u64::from(self.is_b)
     }
 
-    /// An edge by its place: of a triangle by its two vertices.
+    /// Name of an edge by its index: for a triangle by its two vertices.
     pub(super) fn edge_name(&self, edge: u32) -> u64 {
         if self.mesh().is_none() {
             return mix(self.corner_name(edge), 1);
@@ -148,12 +147,12 @@ impl<'a> Leaf<'a> {
     }
 }
 
-/// What a vertex of one of the two is called.
+/// Name of a vertex of one of the two.
 pub(super) fn corner_name(vertex: u32, is_b: bool) -> u64 {
     u64::from(vertex) << 1 | u64::from(is_b)
 }
 
-/// Two names as one.
+/// Combines two names.
 pub(super) fn mix(one: u64, other: u64) -> u64 {
     // Source: Steele, Lea, Flood 2014, Fast splittable pseudorandom number generators (the finalizer).
     let mut x = one

@@ -1,17 +1,17 @@
-//! Where two leaves themselves meet: what stands for them where no feature of the one lies over the other.
+//! The contact of two leaves where no feature of one lies over the other.
 //!
-//! In: the leaves and the answer of their own query. Out: one point on each, straight across along its normal.
+//! In: the leaves and the result of their query. Out: one point on each, opposite each other along the normal.
 
 use super::leaf::{Leaf, mix};
 use crate::math::{Point, Vec3};
 use crate::narrow::exact::Closest;
 use crate::narrow::mesh::LeafContact;
 
-/// Where the leaves themselves meet, straight across along their own normal.
+/// Where the leaves themselves meet, opposite each other along their own normal.
 pub(super) fn nearest(a: &Leaf<'_>, b: &Leaf<'_>, patch: u32, found: &LeafContact) -> LeafContact {
     let normal = found.closest.normal;
     let points = match crossing(a, b) {
-        // Two triangles that cross have a depth, and what their query names is no more than a corner that is so deep.
+        // Two triangles that cross have a depth, and the points of their query are no more than a corner at that depth.
         Some(middle) => edges_across(&a.corners, &b.corners, &normal).unwrap_or([middle; 2]),
         None => [found.closest.point_a, found.closest.point_b],
     };
@@ -29,8 +29,8 @@ pub(super) fn nearest(a: &Leaf<'_>, b: &Leaf<'_>, patch: u32, found: &LeafContac
     }
 }
 
-/// The points straight across from each other of the two edges that lie deepest along a normal, on A's and on B's;
-/// `None`: they do not pass each other there.
+/// The opposite points of the two edges that lie deepest along a normal, on A's and on B's; `None`: they do not pass
+/// each other there.
 fn edges_across(a: &[Point; 3], b: &[Point; 3], normal: &Vec3) -> Option<[Point; 2]> {
     let deepest = |corners: &[Point; 3], outward: Vec3| {
         let mut by_depth = *corners;
@@ -47,7 +47,7 @@ fn edges_across(a: &[Point; 3], b: &[Point; 3], normal: &Vec3) -> Option<[Point;
     (on(place_a) && on(place_b)).then(|| [from_a + along_a * place_a, from_b + along_b * place_b])
 }
 
-/// The middle of what two triangles share where they cross.
+/// The middle of the segment in which two triangles cross.
 fn crossing(a: &Leaf<'_>, b: &Leaf<'_>) -> Option<Point> {
     let (normal_a, normal_b) = (a.normal?, b.normal?);
     let (of_a, of_b) = (a.corners, b.corners);

@@ -1,5 +1,5 @@
-//! Goal: leaves that are apart never touch, and what surely crosses does. Method: seeded triangles, parted by a plane
-//! or anywhere; each cheap answer against the whole one.
+//! Goal: leaves that are apart never touch, and what surely crosses does. Method: seeded triangles, separated by a
+//! plane or placed anywhere; each cheap result is compared with the full one.
 
 use super::*;
 
@@ -25,7 +25,7 @@ fn bug_triangles_a_plane_parts_by_millimetres_never_touch() {
         let mut side = |sign: f64| {
             [(); 3].map(|()| {
                 let p = vector(0.035);
-                // Beyond the plane by half the gap at least; one corner stands just there.
+                // Beyond the plane by at least half the gap; one corner exactly at it.
                 let height = normal.dot(&p).abs().min(0.01);
                 Point::from(p - normal * normal.dot(&p) + normal * (sign * (height + apart / 2.0)))
             })
@@ -44,7 +44,7 @@ fn bug_triangles_a_plane_parts_by_millimetres_never_touch() {
     }
 }
 
-/// What surely crosses has an overlap; what is moved apart by it does not.
+/// Triangles that surely cross overlap; moved apart by that overlap, they do not.
 #[test]
 fn what_surely_crosses_is_found_crossing() {
     let mut crossed = 0;
@@ -65,7 +65,7 @@ fn what_surely_crosses_is_found_crossing() {
     assert!(crossed > 1_000, "{crossed}");
 }
 
-/// Corners in one line but for rounding make a normal of noise, and with it weights of a point anywhere.
+/// Corners that are collinear up to rounding give a normal of noise, and with it weights of any point.
 #[test]
 fn bug_a_face_that_is_flat_by_rounding_reaches_no_farther_than_its_edges() {
     let face = |corners: [[f64; 3]; 3]| corners.map(Point::from);
@@ -84,7 +84,7 @@ fn bug_a_face_that_is_flat_by_rounding_reaches_no_farther_than_its_edges() {
         ),
     ];
     for (flat, other) in cases {
-        // Its longest edge is all of it.
+        // The triangle is just its longest edge.
         let line = [flat[0], flat[1], flat[1]];
         let truth = gap(&line, &other, 1e-15, f64::INFINITY).unwrap().gap;
         assert!(truth.width() < 1e-12, "{truth:?}");
@@ -138,7 +138,7 @@ fn bug_what_is_all_on_one_side_of_a_needle_does_not_surely_cross_it() {
     assert!(!surely_crosses(&needle, &other, 0.0));
 }
 
-/// Whatever the corners are off by: needles of all widths, met near their edges by triangles of all sizes.
+/// For any rounding of the corners: needles of all widths, met near their edges by triangles of all sizes.
 #[test]
 fn what_surely_crosses_does_so_wherever_rounding_puts_the_corners() {
     let (mut sure, mut crossed) = (0, 0);

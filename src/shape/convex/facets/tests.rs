@@ -1,8 +1,8 @@
-//! Tests of surfaces of hulls: closed, around all points, corners told exactly.
+//! Tests of hull surfaces: closed, around all points, exact corners.
 
 use super::*;
 
-/// Every point on or beneath every facet, neighbours beside each other, and as many facets as a ball has.
+/// Every point on or beneath every facet, neighbours adjacent, and the number of facets of a sphere.
 fn check(points: &[Point]) -> Vec<Facet> {
     let facets = facets_of(points).unwrap();
     let mut named = vec![false; points.len()];
@@ -70,7 +70,7 @@ fn what_lies_on_a_face_or_an_edge_is_no_corner() {
         .map(|(x, y, z)| whole(x, y, z))
         .collect();
     assert_eq!(corners(&octahedron), 6);
-    // A point an ulp above the middle of a face is one.
+    // A point an ulp above the middle of a face is a corner.
     let mut cube = cube;
     cube.push(Point::new(0.5, 0.25, f64::from(n).next_up()));
     assert_eq!(corners(&cube), 9);

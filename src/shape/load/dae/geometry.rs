@@ -25,8 +25,8 @@ pub(super) fn read<'a>(file: &DaeFile<'a>, geometry: Node<'a, 'a>) -> Result<Par
         return Err(flaw(geometry, text));
     };
     let mut part = Part::default();
-    // Several primitives share one list of corners as a rule; each list is read once, and kept as its first corner and
-    // how many it has.
+    // Several primitives usually share one list of corners; each list is read once, and stored as its first corner and
+    // its length.
     let mut lists: BTreeMap<usize, (u32, usize)> = BTreeMap::new();
     for primitive in mesh.children().filter(Node::is_element) {
         let kind = primitive.tag_name().name();
@@ -61,7 +61,7 @@ fn place(k: usize) -> Result<u32, Flaw> {
     u32::try_from(k).map_err(|_| Flaw::new("more than 2^32 vertices: split the file"))
 }
 
-/// Where the corner's number stands among the numbers of a corner, and what it counts in.
+/// The position's offset among the numbers of a corner, and the list it indexes.
 struct Inputs<'a> {
     positions: Node<'a, 'a>,
     offset: usize,
@@ -174,7 +174,7 @@ fn positions<'a>(file: &DaeFile<'a>, source: Node<'a, 'a>) -> Result<Vec<Point>,
     Ok(corners.map(|v| Point::new(v[x], v[y], v[z])).collect())
 }
 
-/// How numbers of a primitive become corners of the part.
+/// How numbers of a primitive map to corners of the part.
 struct Corners<'a> {
     first: u32,
     count: usize,

@@ -1,8 +1,8 @@
 //! COLLADA (.dae) 1.4 and 1.5: triangles and polygons of the geometries that the scene instances, each at its node's
-//! place, in the unit and with the up-axis that the file names.
+//! transform, in the unit and with the up-axis that the file names.
 //!
-//! What is not read (skins, splines, holes, look-at and skew transforms, other files) is refused by name: geometry left
-//! out in silence would be a collision never seen. Materials, lights, cameras, lines and animations carry no surface.
+//! Unsupported content (skins, splines, holes, look-at and skew transforms, other files) is refused by name: geometry
+//! silently left out would be a collision never seen. Materials, lights, cameras, lines and animations have none.
 //!
 //! Source: Khronos, "COLLADA - Digital Asset Schema Release 1.4.1" and "1.5.0".
 
@@ -16,9 +16,9 @@ use roxmltree::{Document, Node, ParsingOptions};
 use super::{Flaw, Soup, finite};
 use crate::math::Point;
 
-/// XML elements and texts of one file: a robot's have some thousands, bulk data counts once.
+/// Most XML elements and texts of one file: a robot's have some thousands, bulk data counts once.
 const XML_NODES_MAX: u32 = 5_000_000;
-/// Elements within elements; a deeper file is no scene, and reading it would need a deep stack.
+/// Deepest nesting of elements; a deeper file is no scene, and reading it would need a deep stack.
 const XML_DEPTH_MAX: usize = 200;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Flaw> {
@@ -55,8 +55,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Flaw> {
     Ok(soup)
 }
 
-/// Refuses deep nesting before the XML reader, which may recurse, sees it. Counts tags roughly: comments and texts have
-/// none that matter here.
+/// Refuses deep nesting before the XML reader, which may recurse, sees it. Counts tags roughly: those in comments and
+/// texts do not matter here.
 fn check_depth(bytes: &[u8]) -> Result<(), Flaw> {
     let mut depth = 0_usize;
     for (at, byte) in bytes.iter().enumerate() {
@@ -81,7 +81,7 @@ fn check_depth(bytes: &[u8]) -> Result<(), Flaw> {
 
 /// The elements of a file by their id.
 struct DaeFile<'a> {
-    /// `None`: the id is doubled.
+    /// `None`: the id occurs twice.
     ids: BTreeMap<&'a str, Option<Node<'a, 'a>>>,
 }
 
@@ -170,7 +170,7 @@ impl Frame {
                 Up::Y
             }
         };
-        // An asset further down may name another unit; files in the wild repeat the first at most.
+        // An asset further down may name a different unit; real files at most repeat the first.
         let mut inner = root.descendants().filter(|node| {
             matches!(node.tag_name().name(), "unit" | "up_axis")
                 && node.ancestors().nth(2).is_some_and(|up| up != root)
@@ -182,7 +182,7 @@ impl Frame {
         Ok(Self { unit_m, up })
     }
 
-    /// Metres, z up. The rows of the specification's table: what is right, up and towards the viewer.
+    /// Metres, z up. The rows of the specification's table: right, up and towards the viewer.
     fn to_metres(&self, p: &Point) -> Point {
         let turned = match self.up {
             Up::X => Point::new(-p.y, -p.z, p.x),
@@ -193,7 +193,7 @@ impl Frame {
     }
 }
 
-/// A mistake at an element.
+/// An error at an element.
 fn flaw(node: Node<'_, '_>, text: impl Into<String>) -> Flaw {
     Flaw::at(line(node), text)
 }
@@ -213,7 +213,7 @@ fn children<'a>(node: Node<'a, 'a>, name: &str) -> impl Iterator<Item = Node<'a,
         .filter(move |child| child.is_element() && child.tag_name().name() == name)
 }
 
-/// All text of an element: a comment in the midst cuts it in parts.
+/// All text of an element: a comment in between splits it into parts.
 fn text_of(node: Node<'_, '_>) -> String {
     let mut parts = node
         .children()
@@ -225,14 +225,14 @@ fn text_of(node: Node<'_, '_>) -> String {
 
 /// All numbers of an element.
 fn numbers(node: Node<'_, '_>) -> Result<Vec<f64>, Flaw> {
-    // The line of a node is counted from the start of the file: only where it is wanted.
+    // The line of a node is counted from the start of the file, so only on error.
     text_of(node)
         .split_ascii_whitespace()
         .map(|word| finite(word).map_err(|text| flaw(node, text)))
         .collect()
 }
 
-/// Exactly so many numbers.
+/// Exactly `N` numbers.
 fn exactly<const N: usize>(node: Node<'_, '_>) -> Result<[f64; N], Flaw> {
     let all = numbers(node)?;
     let given = all.len();
@@ -245,7 +245,7 @@ fn exactly<const N: usize>(node: Node<'_, '_>) -> Result<[f64; N], Flaw> {
     })
 }
 
-/// A whole number of an attribute.
+/// An integer attribute.
 fn whole(node: Node<'_, '_>, attribute: &str) -> Result<Option<usize>, Flaw> {
     let Some(text) = node.attribute(attribute) else {
         return Ok(None);

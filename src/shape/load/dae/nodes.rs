@@ -1,4 +1,4 @@
-//! The tree of nodes: which geometry stands where.
+//! The tree of nodes: which geometry is placed where.
 
 use std::collections::BTreeMap;
 
@@ -10,9 +10,9 @@ use super::{DaeFile, child, children, exactly, flaw};
 use crate::math::{Point, Vec3};
 use crate::shape::load::{Flaw, Soup};
 
-/// Nodes visited: instances of instances can multiply without end.
+/// Most nodes visited: instances of instances can multiply without end.
 const VISITS_MAX: usize = 1_000_000;
-/// Nodes within nodes, instances included.
+/// Deepest nesting of nodes, instances included.
 const DEPTH_MAX: usize = 200;
 
 struct Walk<'a, 'f> {
@@ -23,7 +23,7 @@ struct Walk<'a, 'f> {
     soup: &'f mut Soup,
 }
 
-/// Puts every geometry of the scene at its place; without a scene, every geometry as it is.
+/// Places every geometry of the scene; without a scene, every geometry as it is.
 pub(super) fn instance_all<'a>(
     file: &DaeFile<'a>,
     root: Node<'a, 'a>,
@@ -61,7 +61,7 @@ pub(super) fn instance_all<'a>(
     Ok(())
 }
 
-/// The scene that the file shows; where it names none, the only one there is.
+/// The scene that the file shows; if it names none, the only one.
 fn visual_scene<'a>(file: &DaeFile<'a>, root: Node<'a, 'a>) -> Result<Option<Node<'a, 'a>>, Flaw> {
     let scene = child(root, "scene");
     if let Some(instance) = scene.and_then(|scene| child(scene, "instance_visual_scene")) {
@@ -119,7 +119,7 @@ impl<'a> Walk<'a, '_> {
         Ok(())
     }
 
-    /// Adds a geometry at a place.
+    /// Adds a geometry at a transform.
     fn instance(&mut self, geometry: Node<'a, 'a>, place: &Matrix4<f64>) -> Result<(), Flaw> {
         if geometry.tag_name().name() != "geometry" {
             let text = format!(
@@ -139,7 +139,7 @@ impl<'a> Walk<'a, '_> {
         let first = place_of(self.soup.vertices.len());
         let is_identity = *place == Matrix4::identity();
         let moved = part.vertices.iter().map(|p| {
-            // As written where nothing moves it: no rounding.
+            // As written if nothing moves it: no rounding.
             if is_identity {
                 *p
             } else {
@@ -157,12 +157,12 @@ impl<'a> Walk<'a, '_> {
     }
 }
 
-/// As a number of a face; `Soup::reserve` has checked that it fits.
+/// As an index of a face; `Soup::reserve` has checked that it fits.
 fn place_of(k: usize) -> u32 {
     u32::try_from(k).unwrap_or(u32::MAX)
 }
 
-/// The matrix of a transform element, columns to the right; `None` for other elements.
+/// The matrix of a transform element, for column vectors; `None` for other elements.
 fn transform(node: Node<'_, '_>) -> Result<Option<Matrix4<f64>>, Flaw> {
     Ok(Some(match node.tag_name().name() {
         "matrix" => {

@@ -1,5 +1,5 @@
-//! Goal: a DAE stands where its nodes, unit and up-axis put it, and what is not read is refused in its line.
-//! Method: a hand-written file with known answers, then one change to it a case.
+//! Goal: a DAE is placed by its nodes, unit and up-axis, and content that is not supported is refused with its line.
+//! Method: a hand-written file with known results, then one change to it per case.
 
 use crate::math::{Aabb, Point, Vec3};
 use crate::shape::load::Kind;
@@ -63,7 +63,7 @@ fn up_axes_and_units_are_honoured() {
     );
 }
 
-/// What to change in the file, into what, and the line and text of the refusal.
+/// The change to the file, and the line and text of the refusal.
 const REFUSED: &[(&str, &str, usize, &str)] = &[
     ("meter=\"0.0254\"", "meter=\"-1\"", 0, "its unit is -1 m"),
     ("Y_UP", "W_UP", 6, "write X_UP, Y_UP or Z_UP"),
@@ -192,7 +192,7 @@ fn what_a_dae_holds_and_we_do_not_read_is_refused_with_its_line() {
     }
 }
 
-/// Each source is a list of its own: a face of the first was let reach into the second.
+/// Each source is a separate list: a face of the first could reach into the second.
 #[test]
 fn bug_faces_of_a_list_that_was_read_before_stay_in_it() {
     let with = |last: u32| {

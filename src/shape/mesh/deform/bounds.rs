@@ -1,14 +1,14 @@
 //! The box and the radius of a mesh that deforms: how they follow its vertices.
 //!
-//! In: what has come, and the boxes of the tree. Out: bounds that hold all vertices at once, and that draw back again
-//! where only some of the vertices come at a time.
+//! In: the update, and the boxes of the tree. Out: bounds that contain all vertices at once, and that shrink again even
+//! if only some of the vertices are sent at a time.
 
 use super::{Deform, Mesh, aabb};
 use crate::math::{Aabb, Point, ROUND, Vec3};
 
 impl Deform {
-    /// A box and a radius that hold all triangles: the root's boxes, widened by how far a vertex may be outside of
-    /// them, within the bounds so far. A sender may send in each tick, so that no refit ends with nothing newer.
+    /// A box and a radius that contain all triangles: the root's boxes, widened by how far a vertex may be outside
+    /// them, within the bounds so far. A sender may send in each tick, so that no refit ends without newer vertices.
     pub(super) fn fitted(&self, bounds: &Aabb, centre: &Point) -> Option<(Aabb, f64)> {
         let root = self.around.first().filter(|_| self.stale_m.is_finite())?;
         let around = match self.stale_m {
@@ -27,7 +27,7 @@ impl Deform {
         ))
     }
 
-    /// Adds to what the bounds have drawn back by.
+    /// Adds what the bounds have shrunk by.
     ///
     /// * `step_m` - the largest displacement of the vertices that came, metres.
     pub(super) fn note_shed(&mut self, step_m: f64, then: &(Aabb, f64), now: &(Aabb, f64)) {
@@ -38,8 +38,8 @@ impl Deform {
 }
 
 impl Mesh {
-    /// Running sum of how far, in each update, a vertex moved or the bounds drew back, whichever is more, metres; 0 for
-    /// a rigid mesh. What is asked of its bounds may be told otherwise once this has grown by what was lacking.
+    /// Running sum of how far, in each update, a vertex moved or the bounds shrank, whichever is more, metres; 0 for a
+    /// rigid mesh. A test of its bounds may have a different result once this has grown by what was lacking.
     #[inline]
     pub(crate) fn shed_m(&self) -> f64 {
         self.deform.as_ref().map_or(0.0, |deform| deform.shed_m)

@@ -1,4 +1,4 @@
-//! Boxes against brute force over the vertices, whatever was moved and wherever a refit stopped.
+//! Boxes compared with brute force over the vertices, for any motion and wherever a refit stopped.
 
 #![allow(
     clippy::cast_possible_truncation,
@@ -78,7 +78,7 @@ fn boxes_hold_their_triangles_wherever_a_refit_stops_and_whatever_comes_meanwhil
         mesh.refit(step * 3 % 17);
         boxes_hold(&mesh);
     }
-    // Rounds end, whatever came meanwhile, and then the boxes fit.
+    // Rounds end, whatever arrived in between, and then the boxes fit.
     while mesh.refit(5) > 0 {}
     assert_eq!((mesh.lag_m(), mesh.refit(1)), (0.0, 0));
     boxes_hold(&mesh);
@@ -143,7 +143,7 @@ fn a_mesh_with_two_vertices_in_one_place_cannot_deform() {
     );
 }
 
-/// Also one that no face names: whole updates hold it.
+/// Also one that no face names: whole updates contain it.
 #[test]
 fn bug_a_vertex_that_no_message_can_hold_is_refused_at_once() {
     let p = |x: f64| Point::new(x, x * x, 0.0);
@@ -219,7 +219,7 @@ fn bug_a_mesh_whose_vertices_come_in_parts_shrinks_again_after_a_refit() {
         mesh.bend(7, &[far]);
         boxes_hold(&mesh);
         assert!(mesh.radius() > 4.0 * radius);
-        // Until the boxes hold the vertices again, they may be anywhere that they have been.
+        // Until the boxes contain the vertices again, they may be anywhere that they have been.
         mesh.bend(7, &[one]);
         assert!(mesh.radius() > 4.0 * radius);
         boxes_hold(&mesh);

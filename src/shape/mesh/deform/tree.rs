@@ -1,15 +1,15 @@
-//! Another tree for a mesh that has deformed far from the shape its tree was built for: built by a worker from a copy,
-//! put in place between two ticks.
+//! A new tree for a mesh that has deformed far from the shape its tree was built for: built by a worker from a copy,
+//! installed between two ticks.
 
 use super::{Corners, Mesh, fit, point};
 use crate::math::{Point, ROUND};
 use crate::shape::mesh::ObbTree;
 
-/// A tree whose boxes have grown to so many times the surface they had when it was built is to be built anew: up to
-/// here a refitted tree takes some 50 % more tests at most (measured for a displacement of a fifth of the size).
+/// A tree whose boxes have grown to this many times their surface at its build is built again: up to here a refitted
+/// tree takes some 50 % more tests at most (measured for a displacement of a fifth of the size).
 const WORN: f32 = 1.5;
 
-/// What a worker needs.
+/// The input of a worker.
 #[derive(Clone, Debug)]
 pub(crate) struct TreeJob {
     rows: Vec<[f32; 4]>,
@@ -18,19 +18,19 @@ pub(crate) struct TreeJob {
     revision: u32,
 }
 
-/// What it yields: boxes that fit the vertices of the copy.
+/// Its result: boxes that fit the vertices of the copy.
 #[derive(Clone, Debug)]
 pub(crate) struct NewTree {
     obb: ObbTree,
     around: Vec<Corners>,
     surface: f32,
-    /// As when the copy was made.
+    /// As of when the copy was made.
     bent_m: f64,
     revision: u32,
 }
 
 impl TreeJob {
-    /// Lets it fail.
+    /// Makes it fail.
     #[cfg(test)]
     pub(crate) fn spoil(&mut self) {
         self.faces[0] = [u32::MAX; 3];
@@ -57,8 +57,7 @@ impl TreeJob {
 }
 
 impl Mesh {
-    /// A copy for a worker, where the boxes have grown so much since the tree was built that another would serve
-    /// better.
+    /// A copy for a worker, if the boxes have grown so much since the tree was built that a new one would be better.
     pub(crate) fn worn_tree(&self) -> Option<TreeJob> {
         let deform = self.deform.as_ref()?;
         (deform.last_surface > WORN * deform.built_surface).then(|| TreeJob {
@@ -69,8 +68,8 @@ impl Mesh {
         })
     }
 
-    /// Puts another tree in place: what names boxes of the old one is to be forgotten. False for one that was asked of
-    /// another tree, and is not taken.
+    /// Installs a new tree: anything that names boxes of the old one must be forgotten. False, and not installed, if it
+    /// was ordered for a different tree.
     pub(crate) fn take_tree(&mut self, new: NewTree) -> bool {
         let Some(deform) = self.deform.as_mut() else {
             return false;
@@ -81,7 +80,7 @@ impl Mesh {
         self.obb = new.obb;
         deform.around = new.around;
         deform.revision += 1;
-        // What has moved since the copy was made.
+        // The motion since the copy was made.
         let moved_m = deform.bent_m - new.bent_m;
         deform.stale_m = if moved_m > 0.0 {
             moved_m + 4.0 * ROUND * deform.bent_m

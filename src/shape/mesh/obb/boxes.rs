@@ -1,5 +1,5 @@
-//! A tree over boxes that stand anywhere: those of a body's shapes. Leaves along the axes of each box, what is above
-//! them along those of the frame.
+//! A tree over oriented boxes: those of a body's shapes. Leaves are aligned with each box's own axes, the boxes above
+//! them with those of the frame.
 
 use nalgebra::Matrix3;
 
@@ -9,9 +9,9 @@ use crate::math::{Aabb, Point, Pose, Vec3};
 use crate::simd::obb::LANES;
 
 impl ObbTree {
-    /// A tree over at least one box, each at its pose; a leaf holds the `u32` that comes with it.
+    /// A tree over at least one box, each at its pose; a leaf holds the `u32` given with it.
     ///
-    /// Boxes hold the corners as they come out of `pose * corner`: rounding of that is its user's to allow for.
+    /// Boxes contain the corners as computed by `pose * corner`: the caller allows for that rounding.
     ///
     /// Cost: O(n log n).
     pub(crate) fn over(boxes: &[(u32, Pose, Aabb)]) -> Self {
@@ -28,7 +28,7 @@ impl ObbTree {
         tree
     }
 
-    /// Appends what is below a box over `order`; returns that box and what it holds.
+    /// Appends everything below a box over `order`; returns that box and its contents.
     fn grow(&mut self, order: &mut [(u32, Vec3)], boxes: &[(u32, Pose, Aabb)]) -> (Fitted, u32) {
         if let [(at, _)] = order {
             let (name, pose, aabb) = &boxes[*at as usize];

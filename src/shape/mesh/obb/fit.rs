@@ -1,6 +1,6 @@
-//! Which axes a box takes: those of the area's covariance, of the mesh's frame, or of the one triangle.
+//! The axes of a box: those of the area's covariance, of the mesh's frame, or of the single triangle.
 //!
-//! In: triangles. Out: axes and a centre in f64, and the corners that the box must hold.
+//! In: triangles. Out: axes and a centre in f64, and the corners that the box must contain.
 
 use nalgebra::{Matrix3, SymmetricEigen};
 
@@ -19,7 +19,7 @@ pub(super) fn fit(part: &[(u32, Vec3)], corners: &impl Fn(u32) -> [Point; 3]) ->
     let axes = if let [(face, _)] = part {
         triangle_axes(&corners(*face))
     } else {
-        // The tighter of the two by the surface of the box.
+        // The tighter of the two by the box's surface area.
         let candidates = [area_axes(part, corners), Matrix3::identity()];
         let surface = |axes: &Matrix3<f64>| {
             let (_, half) = extents(axes, &all);
@@ -80,7 +80,7 @@ fn triangle_axes([a, b, c]: &[Point; 3]) -> Matrix3<f64> {
     Matrix3::from_columns(&[along, normal.cross(&along), normal])
 }
 
-/// A unit vector at right angles to a unit vector.
+/// A unit vector orthogonal to a unit vector.
 fn any_across(along: &Vec3) -> Vec3 {
     let least = Vec3::ith(along.iamin(), 1.0);
     let across = least - along * along.dot(&least);
@@ -112,7 +112,7 @@ fn area_axes(part: &[(u32, Vec3)], corners: &impl Fn(u32) -> [Point; 3]) -> Matr
     if !(largest.is_finite() && largest > f64::MIN_POSITIVE) {
         return Matrix3::identity();
     }
-    // Scaled: the search for eigenvalues stops at an absolute smallness.
+    // Scaled: the eigenvalue search stops at an absolute tolerance.
     let axes = SymmetricEigen::new(covariance / largest).eigenvectors;
     let first = axes.column(0).into_owned().try_normalize(0.5);
     let second = first.and_then(|u| {

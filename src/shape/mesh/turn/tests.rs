@@ -1,11 +1,11 @@
-//! Goal: shells that face inwards are turned, or kept where they stand in another. Method: small solids by hand.
+//! Goal: shells that face inwards are turned, or kept if they lie in another. Method: small solids by hand.
 
 use super::*;
 use crate::shape::mesh::tests::{ball, cuboid, joined, says, winding};
 
 #[test]
 fn law_3_3_an_inverted_shell_is_turned_round_with_all_it_holds() {
-    // Outer shell and cavity both inverted: the outer is in no other, so both are turned.
+    // Outer shell and cavity both inverted: the outer lies in no other, so both are turned.
     let parts = [
         cuboid([5.0, 0.0, 0.0], 2.0, true),
         cuboid([5.0, 0.0, 0.0], 1.0, false),
@@ -28,7 +28,7 @@ fn law_3_3_a_cavity_within_a_shell_is_kept() {
     assert_eq!(winding(&mesh, 1.5, 0.2, 0.3), 1);
 }
 
-/// A pocket was one where the face it is flush with looks to one side of x, and solid where it looks to the other.
+/// A pocket was one if the face it is flush with looked to one side of x, but solid if it looked to the other.
 #[test]
 fn bug_law_3_3_a_pocket_flush_with_a_face_is_one_whichever_way_the_face_looks() {
     for k in 0..6 {
@@ -45,7 +45,7 @@ fn bug_law_3_3_a_pocket_flush_with_a_face_is_one_whichever_way_the_face_looks() 
     }
 }
 
-/// With every corner on the other's surface: a slot from wall to wall is within it, what fills the gap of a U is not.
+/// With every corner on the other's surface: a slot from wall to wall is within it, a filling of the gap of a U is not.
 #[test]
 fn bug_law_3_3_a_shell_that_touches_with_every_corner_is_held_where_its_middle_is() {
     let stretched = |(vertices, faces): (Vec<Point>, Vec<[u32; 3]>), by: [f64; 3]| {
@@ -64,7 +64,7 @@ fn bug_law_3_3_a_shell_that_touches_with_every_corner_is_held_where_its_middle_i
         assert!(!says(&mesh, "faced inwards"), "{k}");
         assert_eq!(winding(&mesh, 0.01, 0.02, 0.03), 0, "{k}");
     }
-    // A U of eight corners, extruded along z, open at the top; what fills it is narrower and lower than its walls.
+    // A U of eight corners, extruded along z, open at the top; the filling is narrower and lower than its walls.
     let outline = [
         [0.0, 0.0],
         [3.0, 0.0],
@@ -103,7 +103,7 @@ fn bug_law_3_3_a_shell_that_touches_with_every_corner_is_held_where_its_middle_i
     assert_eq!(winding(&mesh, 1.51, 1.76, 1.52), 1);
 }
 
-/// Thousands of shells beside and within each other, through the tree and face by face, are as one by one.
+/// Thousands of shells next to and within each other: through the tree and face by face the results are as one by one.
 #[test]
 fn many_shells_are_each_held_or_turned() {
     let n = 12;
@@ -111,7 +111,7 @@ fn many_shells_are_each_held_or_turned() {
     let at = |i: i32| f64::from(i) / f64::from(n) - 0.49;
     for i in 0..n {
         for j in 0..n {
-            // In the plate a pocket, or a pocket with a pebble; beside it a pebble that faces inwards.
+            // In the plate a pocket, or a pocket with a pebble; next to it a pebble that faces inwards.
             parts.push(cuboid([at(i), at(j), 0.0], 0.03, true));
             if (i + j) % 2 == 0 {
                 parts.push(cuboid([at(i), at(j), 0.0], 0.01, false));

@@ -1,4 +1,4 @@
-//! Walks come to where they are to come, at once or in pieces.
+//! Walks arrive where they should, at once or in pieces.
 
 use super::*;
 use crate::shape::mesh::tests::sheet;
@@ -19,7 +19,7 @@ fn a_climb_over_a_convex_surface_ends_at_its_outermost_vertex() {
     let vertices = vertices.iter().map(|v| Point::new(v.x, v.y, v.z)).collect();
     let mesh = Mesh::new(vertices, faces, None).unwrap();
     let count = u32::try_from(mesh.faces().len()).unwrap();
-    // What earlier climbs have come to, other directions' too, shortens the way and leads nowhere else.
+    // The results of earlier climbs, also in other directions, shorten the way without changing the end.
     let mut trails = Trails::default();
     for _ in 0..200 {
         let direction = Vec3::new(unit(), unit(), unit()).normalize();
@@ -30,7 +30,7 @@ fn a_climb_over_a_convex_surface_ends_at_its_outermost_vertex() {
             let top = climb(f64::INFINITY).unwrap();
             assert!(height(top) >= highest - 1e-9, "from {face}");
             assert_eq!(climb(highest - 0.01), None);
-            // Left off again and again it goes on by its own trail, and comes to the same place.
+            // Interrupted again and again, it continues by its own trail and arrives at the same place.
             let mut own = Trails::default();
             let mut asked = 0;
             let found = loop {
@@ -59,10 +59,10 @@ fn a_walk_comes_to_the_place_beneath_a_point_unless_it_is_far() {
         );
         assert!((there - Point::new(x, y, 0.0)).norm() < 1e-12, "{there}");
     }
-    // Beyond the faces that a walk passes, and beyond the border.
+    // Beyond the faces that a walk may visit, and beyond the border.
     assert_eq!(beneath(39.5, 38.5), None);
     assert_eq!(beneath(-1.0, 2.0), None);
-    // Nor along a direction that the sheet leans from by more than a walk goes on.
+    // Nor along a direction from which the sheet leans by more than a walk accepts.
     let flat = Vec3::new(1.0, 0.0, 0.1).normalize();
     assert_eq!(
         mesh.beneath(0, &Point::new(5.0, 5.0, 0.5), &flat, || true),

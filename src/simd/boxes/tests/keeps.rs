@@ -1,10 +1,10 @@
-//! Whether a box keeps to a hold, rounded to nearest: alike at every level, and what follows for it rounded outward.
+//! Whether a box rounded to nearest keeps to a hold: equal at every level, with its consequence for rounding outward.
 
 use super::super::lanes::{LEAST, STEP};
 use super::{FACES, next};
 use crate::simd::boxes::{Held, Hold, Lanes, Level, Portable, SPARE, Work};
 
-/// Tells whether a box keeps to a hold, rounded to nearest.
+/// Whether a box keeps to a hold, rounded to nearest.
 struct Kept<'a>([&'a [f64; 3]; 2], &'a [f64; 3], &'a Held);
 
 impl Work for Kept<'_> {
@@ -33,7 +33,7 @@ fn a_box_that_keeps_to_a_hold_rounded_to_nearest_lies_in_the_looser_one_rounded_
             core: now,
         };
         (hold.core.faces[SPARE], hold.core.faces[SPARE + 4]) = (f32::INFINITY, f32::INFINITY);
-        // Within some steps of what the box is rounded to, on either side.
+        // Within a few steps of the rounded box, on either side.
         for k in FACES {
             for (face, up) in [(&mut hold.fat, -1), (&mut hold.core, 1)] {
                 let face = &mut face.faces[k];
@@ -69,6 +69,6 @@ fn a_box_that_keeps_to_a_hold_rounded_to_nearest_lies_in_the_looser_one_rounded_
         astray += u32::from(wanted && !Portable.holds(&hold.fat, &now));
     }
     assert!(cfg!(miri) || kept > 1000, "{kept}");
-    // Else the hold itself would do, and nothing would be shown.
+    // Otherwise the hold itself would do, and nothing would be tested.
     assert!(cfg!(miri) || astray > 50, "{astray} of {kept}");
 }

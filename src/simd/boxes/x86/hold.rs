@@ -11,7 +11,7 @@ use super::{nearest_avx2, outward_avx2, sign_bits, store};
 /// The lanes of a [`Down`] that are not spare.
 const FACES: u32 = 0x77;
 
-/// The fat box and the core, with whatever stands beside a corner in the spare lanes.
+/// The fat box and the core, with arbitrary values in the spare lanes next to a corner.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn both(held: &Held) -> [__m256; 2] {
@@ -25,7 +25,7 @@ fn both(held: &Held) -> [__m256; 2] {
             _mm_loadu_ps(from.add(8)),
         ]
     };
-    // The last three stand a lane too high, for nothing stands behind them.
+    // The last three are a lane too high, because nothing follows them in memory.
     let l = _mm_permute_ps::<0b11_11_10_01>(t);
     [_mm256_set_m128(u, x), _mm256_set_m128(l, r)]
 }
@@ -38,7 +38,7 @@ pub(super) fn take_avx2(
     held: &Held,
     place: &mut Down,
 ) -> bool {
-    // Compared from the register: to read back what was just written in halves would wait for both.
+    // Compared from the register: reading back in halves what was just written would wait for both.
     let faces = outward_avx2(corners[0], corners[1], origin);
     store(faces, place);
     is_within(faces, held)

@@ -1,6 +1,6 @@
-//! The numbers of the lanes that are meant, one after the other.
+//! The numbers of the selected lanes, one after the other.
 //!
-//! In: a mask. Out: numbers, as many as it has ones, with no branch on how many.
+//! In: a mask. Out: as many numbers as it has ones, without a branch on their count.
 
 use std::arch::x86_64::{
     _mm_loadl_epi64, _mm256_add_epi32, _mm256_cvtepu8_epi32, _mm256_set1_epi32,
@@ -10,7 +10,7 @@ use std::arch::x86_64::{
 
 use crate::simd::boxes::WIDTH;
 
-/// By eight bits: the places of the ones, and then anything.
+/// By eight bits: the indices of the ones, followed by arbitrary values.
 const PLACES: [[u8; 8]; 256] = {
     let mut places = [[0; 8]; 256];
     let mut bits = 0;
@@ -40,7 +40,7 @@ pub(super) fn number_avx2(lanes: u16, first: u32, place: &mut [u32; WIDTH]) {
     };
     let at = low.count_ones() as usize;
     let from = place.as_mut_ptr();
-    // SAFETY: eight numbers from the begin, and eight behind the up to eight that stay, lie inside the array.
+    // SAFETY: eight numbers from the start, and eight behind the up to eight that stay, lie inside the array.
     unsafe {
         _mm256_storeu_si256(from.cast(), eight(low, first));
         _mm256_storeu_si256(from.add(at).cast(), eight(high, first.wrapping_add(8)));
@@ -52,7 +52,7 @@ pub(super) fn number_avx2(lanes: u16, first: u32, place: &mut [u32; WIDTH]) {
 pub(super) fn number_avx512(lanes: u16, first: u32, place: &mut [u32; WIDTH]) {
     let places = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     let all = _mm512_add_epi32(_mm512_set1_epi32(first.cast_signed()), places);
-    // To a register first: written to memory at once, some processors take a hundred steps for it.
+    // To a register first: some processors take a hundred steps to write it to memory directly.
     let some = _mm512_maskz_compress_epi32(lanes, all);
     // SAFETY: the array holds sixteen numbers.
     unsafe { _mm512_storeu_si512(place.as_mut_ptr().cast(), some) };
