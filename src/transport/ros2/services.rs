@@ -26,7 +26,7 @@ use super::names::Names;
 use super::open;
 use super::reply;
 use super::shared::{Say, Shared};
-use super::topics::{TypeName, failed};
+use super::topics::{In, TypeName, failed, patiently};
 use crate::error::{Error, Result};
 use crate::wire::ros::{
     AttachBody, Edited, EnableBody, Gap, GapTold, PutBody, RemoveBody, Reset, SetFilter, TickNow,
@@ -320,8 +320,8 @@ pub(super) fn server<Q: Message + Clone + 'static, R: Message + 'static>(
         .history(History::KeepLast { depth: DEPTH })
         .reliability_reliable(WhenFull::Fail);
     let kind = ServiceTypeName::new(package, kind);
-    node.create_server(mapping, &parsed, &kind, qos.clone(), qos)
-        .map_err(|e| failed(&full, e))
+    let make = || node.create_server(mapping, &parsed, &kind, qos.clone(), qos.clone());
+    patiently(In::AT_START, make).map_err(|e| failed(&full, e))
 }
 
 /// Has the thread that waits on the registry woken by requests.

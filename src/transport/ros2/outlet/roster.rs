@@ -9,6 +9,7 @@ use super::super::RosScene;
 use super::super::lines::{Arrival, Line, of_body};
 use super::super::open;
 use super::super::shared::Say;
+use super::super::topics::In;
 use super::{Outlet, Topics};
 use crate::config::RosKind;
 use crate::error::Error;
@@ -107,7 +108,8 @@ impl Outlet {
         if let Ok(topic) = &topic {
             self.strangers.meet(topic, kind);
         }
-        let line = topic.and_then(|topic| of_body(&mut self.node, &self.context, kind, &topic));
+        let with = (&mut self.node, &self.context);
+        let line = topic.and_then(|topic| of_body(with, kind, &topic, In::BESIDE_TICKS));
         match line {
             Ok(line) => {
                 self.topics.note_heard(&body.name);
