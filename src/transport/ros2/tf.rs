@@ -61,6 +61,8 @@ struct Frame {
     link: Option<Link>,
     /// Who sends its link.
     heard: Heard,
+    /// Who sent it as one that never changes.
+    fixed_by: Option<Gid>,
     /// How many bodies, and the scene, have it as theirs: it stays while there is one.
     pins: usize,
 }
@@ -148,6 +150,28 @@ impl Tree {
         let id = self.ids.get(plain(child));
         let link = id.and_then(|id| self.link(*id));
         link.is_some_and(|link| link.fixed != fixed)
+    }
+
+    /// Whether a fixed link differs from that of its frame which another publisher sent.
+    pub(super) fn is_disputed(&self, link: &TransformStamped, from: Gid) -> bool {
+        let id = self.ids.get(plain(&link.child_frame_id));
+        let Some((frame, old)) = id.and_then(|&id| Some((self.frames.get(id)?, self.link(id)?)))
+        else {
+            return false;
+        };
+        let parent = self.frames.get(old.parent).map(|parent| &*parent.name);
+        let position = link.transform.translation.into();
+        let is_same = parent == Some(plain(&link.header.frame_id))
+            && (old.position, old.orientation) == (position, link.transform.rotation.into());
+        old.fixed && !is_same && frame.fixed_by.is_some_and(|by| by != from)
+    }
+
+    /// A publisher has sent a fixed link of a frame, and it was taken.
+    pub(super) fn note_fixed(&mut self, child: &str, from: Gid) {
+        let id = self.ids.get(plain(child));
+        if let Some(frame) = id.and_then(|id| self.frames.get_mut(*id)) {
+            frame.fixed_by = Some(from);
+        }
     }
 
     /// Bodies are looked for: what came until now is no news any more.

@@ -1,7 +1,7 @@
 //! Links of `/tf` as they come to a source. In: messages. Out: the tree; what is odd about who sends them, in words.
 
 use super::super::tf::Taken;
-use super::stamps::{both, crowded, forgotten, off, older, refused, rivalry};
+use super::stamps::{both, crowded, dispute, forgotten, off, older, refused, rivalry};
 use super::{Receipt, Source};
 use crate::wire::ros::TfMessage;
 
@@ -20,6 +20,7 @@ impl Source {
             let what = ("frame", link.child_frame_id.as_str());
             let stamp_ns = link.header.stamp.to_ns();
             let mixed = self.tree.is_otherwise(what.1, fixed).then(|| both(what));
+            let disputed = fixed && self.tree.is_disputed(link, receipt.from);
             let taken = self.tree.take(link, fixed, receipt.now_ns, self.timeout_ns);
             let odd = match taken {
                 Taken::Newer if !fixed => off(what, stamp_ns, receipt, self.timeout_ns),
@@ -28,11 +29,20 @@ impl Source {
                 Taken::Refused(why) => Some(refused(what, why)),
                 Taken::Newer | Taken::WentBack => None,
             };
-            // Those that never change are said again by whoever starts anew.
             let is_in = !matches!(taken, Taken::Refused(_) | Taken::Full);
+            if fixed && is_in {
+                self.tree.note_fixed(what.1, receipt.from);
+            }
+            // Those that never change are said again by whoever starts anew.
             let rivals = !fixed && is_in && self.tree.hear(what.1, receipt.from, receipt.now_ns);
             let odd = mixed.filter(|_| is_in).or(odd);
-            let odd = if rivals { Some(rivalry(what)) } else { odd };
+            let odd = if rivals {
+                Some(rivalry(what))
+            } else if disputed && is_in {
+                Some(dispute(what))
+            } else {
+                odd
+            };
             back |= taken == Taken::WentBack;
             self.refused += u64::from(!matches!(taken, Taken::Newer | Taken::WentBack));
             self.tell(odd, receipt);
