@@ -40,6 +40,7 @@ pub(super) struct Receipt {
 const NOBODY: Seat = Seat {
     body: 0,
     continuous: false,
+    attached: false,
 };
 
 /// One body of a source of common topics.
@@ -129,10 +130,10 @@ impl Source {
         self.members.iter().map(|member| member.topic.as_str())
     }
 
-    /// What is wrong with its bodies now, at most `most` of them.
+    /// What is wrong with its bodies now, at most `most` of them. One that hangs on another is not its to move.
     pub(super) fn faults(&self, most: usize, now_ns: u64) -> Vec<String> {
         let members = self.members.iter();
-        let members = members.filter(|member| member.seat != NOBODY);
+        let members = members.filter(|member| member.seat != NOBODY && !member.seat.attached);
         let faulty = members.filter_map(|member| {
             let fault = member.fault.clone();
             let fault = fault.or_else(|| self.silence(member, now_ns))?;

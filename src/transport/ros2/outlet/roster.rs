@@ -52,6 +52,14 @@ impl Unheard {
         self.of.drain(..self.of.len().min(RETRIES_MAX)).collect()
     }
 
+    /// A body that waits for its subscription hangs on another one now, or does no more.
+    fn hang(&mut self, name: &str, attached: bool) {
+        let mut waiting = self.of.iter_mut();
+        if let Some((body, _)) = waiting.find(|(body, _)| body.name == name) {
+            body.attached = attached;
+        }
+    }
+
     fn remove(&mut self, name: &str) {
         self.of.retain(|(body, _)| body.name != name);
     }
@@ -74,6 +82,10 @@ impl Outlet {
                 }
                 BodyChange::Removed(name) => {
                     self.part(name);
+                    None
+                }
+                BodyChange::Hung { name, attached } => {
+                    self.unheard.hang(name, *attached);
                     None
                 }
             };
