@@ -19,6 +19,7 @@ mod inlet;
 mod lines;
 mod markers;
 mod mend;
+mod misfits;
 pub mod names;
 mod namesakes;
 mod node;

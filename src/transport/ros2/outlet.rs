@@ -112,7 +112,9 @@ impl Outlet {
             }
             self.diagnose();
             let strange = self.strangers.watch(SystemClock.boottime_ns());
-            for text in self.namesakes.look().into_iter().chain(strange) {
+            let misfits = self.readers.misfits.take_new();
+            let own = self.namesakes.look().into_iter();
+            for text in own.chain(strange).chain(misfits) {
                 self.shared.say(Say::Warn, &text);
             }
             let holds = self.hand_over();
@@ -238,6 +240,7 @@ impl Outlet {
         };
         let mut faults = self.shared.faults();
         faults.extend_from_slice(self.strangers.found());
+        faults.extend(self.readers.misfits.found());
         faults.extend(open_files::short());
         faults.extend(self.unsent.words.clone());
         if self.left_out > 0 {

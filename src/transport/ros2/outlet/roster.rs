@@ -143,6 +143,7 @@ impl Outlet {
         self.unheard.remove(name);
         if let Some(topic) = self.topics.remove(name, &mut self.names) {
             self.strangers.part(&topic);
+            self.readers.misfits.part(&topic);
         }
     }
 }
