@@ -143,11 +143,7 @@ impl RosNode {
             parcels: Arc::clone(&parcels),
             shared: Arc::clone(&shared),
             waker: Arc::clone(&waker),
-            speaker: Speaker {
-                frame_id: scene.frame_id.clone(),
-                book,
-                stamp: None,
-            },
+            speaker: Speaker::of(&scene.frame_id, book),
             boot_id: options.boot_id,
             name: names.full_node(),
             diagnoser: Diagnoser::default(),

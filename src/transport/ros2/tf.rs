@@ -16,6 +16,7 @@ use crate::limits::QUATERNION_NORM_TOLERANCE;
 use crate::math::{Pose, pose_from};
 use crate::wire::RejectReason;
 use crate::wire::ros::TransformStamped;
+pub(super) use crate::wire::ros::plain_frame as plain;
 pub(super) use chain::{Found, Missing};
 use room::FRAME_NAME_BYTES_MAX;
 
@@ -84,11 +85,6 @@ pub(super) struct Tree {
     let_go: u64,
     /// How often all bodies were looked for.
     looks: u64,
-}
-
-/// tf2 knows no slash in front; old senders write it.
-pub(super) fn plain(frame: &str) -> &str {
-    frame.strip_prefix('/').unwrap_or(frame)
 }
 
 impl Tree {
