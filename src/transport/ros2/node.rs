@@ -150,6 +150,7 @@ impl RosNode {
             latest: Latest::default(),
             told_ns: 0,
             shown_ns: 0,
+            heartbeat_ns,
             boxes: boxes(scene),
             left_out: 0,
             unsent: Unsent::default(),
