@@ -91,6 +91,11 @@ impl Line {
         matches!(self, Self::Transforms(_))
     }
 
+    /// Whether it tells the time.
+    pub(super) fn is_clock(&self) -> bool {
+        matches!(self, Self::Clock(..))
+    }
+
     /// Gives it to a body: place of its source, and its own among those of the source.
     pub(super) fn feed(&mut self, source: usize, member: usize) {
         if let Self::Pose(_, feeder) | Self::Odometry(_, feeder) = self {
@@ -259,7 +264,8 @@ pub(super) fn subscribe(
     let kind = ("rosgraph_msgs", "Clock");
     let clock = subscription(node, context, (&clock, kind), NEWEST)?;
     let clock = Line::Clock(clock, Order::default(), Heard::default());
-    let mut lines = vec![Line::Transforms(own), clock];
+    // The clock first: what comes in one round with a time is stamped with that.
+    let mut lines = vec![clock, Line::Transforms(own)];
     let mut odd = Vec::new();
     let mut trees: Vec<(String, bool, Vec<usize>)> = Vec::new();
     // Bodies last: one that an edit has brought must not take a topic away that the scene says.
@@ -278,9 +284,8 @@ pub(super) fn subscribe(
     for (place, source) in others {
         for (member, given) in source.topics().enumerate() {
             let full = names.claim_for_body(given).map_err(Error::Usage);
-            let subscribed = full.and_then(|full| {
-                of_body((&mut *node, context), source.kind, &full, In::AT_START)
-            });
+            let subscribed = full
+                .and_then(|full| of_body((&mut *node, context), source.kind, &full, In::AT_START));
             match subscribed {
                 Ok(mut line) => {
                     line.feed(place, member);
