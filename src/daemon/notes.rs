@@ -15,6 +15,7 @@ pub fn body_note(spec: &BodySpec, id: BodyId, placed: &[PlacedShape]) -> BodyNot
         frame: spec.ros_frame.as_ref().unwrap_or(&spec.name).clone(),
         topic: spec.ros_topic.clone().unwrap_or_default(),
         continuous: spec.continuous,
+        attached: spec.attached_to.is_some(),
         bounds: bounds(placed),
     }
 }

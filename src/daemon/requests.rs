@@ -90,6 +90,10 @@ impl Daemon<'_> {
                 Some(BodyChange::Put(body_note(body, placed.id, shapes)))
             }
             Edit::Remove { name } => Some(BodyChange::Removed(name.clone())),
+            Edit::Attach { name, to, .. } => Some(BodyChange::Hung {
+                name: name.clone(),
+                attached: to.is_some(),
+            }),
             _ => None,
         };
         let changes: Vec<_> = edits
@@ -169,8 +173,8 @@ mod tests {
         }
     }
 
-    #[test]
-    fn bug_a_request_that_changes_nothing_was_told_as_bodies_that_came() {
+    /// What a door is told of bodies where these edits are asked for, one after another.
+    fn told(edits: &[String]) -> Vec<BodyChange> {
         let hub = Hub::new();
         let scene = Scene::parse("", "empty.toml", Path::new("")).unwrap();
         let shapes = build_shapes(&scene).unwrap();
@@ -179,10 +183,8 @@ mod tests {
         let clock = Arc::new(SystemClock);
         let mut daemon = Daemon::new(&scene, shapes, 7, clock.clone(), &mut door).unwrap();
         let mut client = Client::over(Box::new(hub.link()), clock, None, SECOND_NS).unwrap();
-        for radius in [1.0, 1.0, 2.0] {
-            let shape = format!(r#"{{"type": "sphere", "radius": {radius}}}"#);
-            let body = format!(r#"{{"name": "a", "moves": false, "shape": {shape}}}"#);
-            let json = format!(r#"{{"edits": [{{"put": {body}}}]}}"#);
+        for edit in edits {
+            let json = format!(r#"{{"edits": [{edit}]}}"#);
             let request = client.ask(&json, &[]).unwrap();
             let until_ns = SystemClock.monotonic_ns() + 30 * SECOND_NS;
             let answer = loop {
@@ -195,12 +197,35 @@ mod tests {
             assert!(answer.contains(r#""ok":true"#), "{answer}");
         }
         drop(daemon);
-        let radii: Vec<_> = (door.1.iter())
+        door.1
+    }
+
+    fn put(name: &str, radius: f64) -> String {
+        let shape = format!(r#"{{"type": "sphere", "radius": {radius}}}"#);
+        format!(r#"{{"put": {{"name": "{name}", "moves": false, "shape": {shape}}}}}"#)
+    }
+
+    #[test]
+    fn bug_a_request_that_changes_nothing_was_told_as_bodies_that_came() {
+        let told = told(&[1.0, 1.0, 2.0].map(|radius| put("a", radius)));
+        let radii: Vec<_> = (told.iter())
             .map(|change| match change {
                 BodyChange::Put(body) => body.bounds.map(|(_, half)| half[0]),
-                BodyChange::Removed(_) => None,
+                _ => None,
             })
             .collect();
         assert_eq!(radii, [Some(1.0), Some(2.0)]);
+    }
+
+    #[test]
+    fn bug_doors_were_not_told_that_a_body_was_hung_on_another_or_let_go() {
+        let hang = r#"{"attach": {"body": "a", "to": "b"}}"#.to_owned();
+        let let_go = r#"{"detach": "a"}"#.to_owned();
+        let told = told(&[put("a", 1.0), put("b", 1.0), hang.clone(), hang, let_go]);
+        let hung = [true, false].map(|attached| BodyChange::Hung {
+            name: "a".to_owned(),
+            attached,
+        });
+        assert_eq!(told[2..], hung);
     }
 }

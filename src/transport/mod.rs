@@ -87,6 +87,8 @@ pub struct BodyNote {
     pub topic: String,
     /// Whether it is continuous: each of its poses is part of its path.
     pub continuous: bool,
+    /// Whether it hangs on another body, which moves it in the place of its source.
+    pub attached: bool,
     /// Centre and half extents of its box in its own frame, metres; `None`: it is infinite.
     pub bounds: Option<([f64; 3], [f64; 3])>,
 }
@@ -98,6 +100,25 @@ pub enum BodyChange {
     Put(BodyNote),
     /// It left: its name.
     Removed(String),
+    /// It was hung on another body, or let go.
+    Hung {
+        /// Its name.
+        name: String,
+        /// Whether it hangs on another one now.
+        attached: bool,
+    },
+}
+
+impl BodyChange {
+    /// The body's name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Put(BodyNote { name, .. }) | Self::Removed(name) | Self::Hung { name, .. } => {
+                name
+            }
+        }
+    }
 }
 
 /// The daemon's side of a transport.

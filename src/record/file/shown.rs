@@ -48,11 +48,7 @@ impl Show {
     /// * `frame_id` - the scene's frame.
     pub(super) fn new(frame_id: &str) -> Self {
         Self {
-            speaker: Speaker {
-                frame_id: frame_id.to_owned(),
-                book: Book::default(),
-                stamp: None,
-            },
+            speaker: Speaker::of(frame_id, Book::default()),
         }
     }
 

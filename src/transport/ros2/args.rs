@@ -86,6 +86,11 @@ impl RosArgs {
         let name = self
             .special(&["__node", "__name"], default)
             .unwrap_or(default);
+        if name.contains("__") && is_token(name) {
+            return Err(format!(
+                "--ros-args: __node:={name}: services of a node of this name cannot be opened by this build: write no two _ in a row in it (topics and namespaces may have them)"
+            ));
+        }
         if is_token(name) {
             return Ok(name.to_owned());
         }
@@ -229,9 +234,23 @@ mod tests {
         for line in ["-r __node:=9lives", "-r __node:=a/b"] {
             assert!(parse(line).unwrap().node_name("sweepd").is_err(), "{line}");
         }
+        assert_eq!(
+            parse("-r __ns:=/robot__1").unwrap().namespace("sweepd"),
+            Ok("/robot__1".to_owned())
+        );
         for line in ["-r __ns:=robot", "-r __ns:=/robot/", "-r __ns:=//a"] {
             assert!(parse(line).unwrap().namespace("sweepd").is_err(), "{line}");
         }
+    }
+
+    #[test]
+    fn bug_a_node_name_that_cannot_be_kept_was_told_of_a_topic() {
+        let args = parse("-r __node:=my__node").unwrap();
+        let why = args.node_name("sweepd").unwrap_err();
+        assert!(
+            why.contains("__node:=my__node") && why.contains("no two _"),
+            "{why}"
+        );
     }
 
     #[test]

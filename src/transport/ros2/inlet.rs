@@ -149,7 +149,7 @@ impl Inlet {
     }
 
     /// Takes what is there; whether there may be more.
-    fn round(&mut self, receipt: Receipt) -> bool {
+    fn round(&mut self, mut receipt: Receipt) -> bool {
         for source in &mut self.sources {
             let timeout_ns = self.shared.timeout_ns(source.place);
             source.set_limits(timeout_ns, self.shared.max_skew_ns());
@@ -159,6 +159,10 @@ impl Inlet {
         for at in 0..self.lines.len() {
             let (some, rest) = self.take(at, receipt);
             more |= rest;
+            // Stamps of this round are compared with the time that it brought.
+            if self.lines.get(at).is_some_and(Line::is_clock) {
+                receipt.ros_now_ns = self.shared.now().to_ns();
+            }
             // A whole frame waits for nothing else: each look at a quiet subscription or server is a call into the
             // system.
             if some && self.lines.get(at).is_some_and(Line::is_whole) {

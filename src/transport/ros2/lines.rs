@@ -1,6 +1,7 @@
 //! Subscriptions: which topics a scene needs, each once, and who sends on them. In: sources, names. Out: [`Line`]s.
 
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 use ros2_client::{Context, Gid, MessageInfo, Node, Subscription};
 use rustdds::mio1::{Interest, Registry, Token};
@@ -20,6 +21,7 @@ const FRAMES: In = In {
     reliable: false,
     latched: false,
     depth: 16,
+    patience: In::AT_START,
 };
 /// Links that change.
 const LINKS: In = In {
@@ -30,7 +32,7 @@ const LINKS: In = In {
 const FIXED_LINKS: In = In {
     reliable: true,
     latched: true,
-    depth: 100,
+    ..LINKS
 };
 /// The newest is all that counts.
 const NEWEST: In = In { depth: 1, ..FRAMES };
@@ -87,6 +89,11 @@ impl Line {
     /// Whether its messages are whole frames, which need no look at anything else.
     pub(super) fn is_whole(&self) -> bool {
         matches!(self, Self::Transforms(_))
+    }
+
+    /// Whether it tells the time.
+    pub(super) fn is_clock(&self) -> bool {
+        matches!(self, Self::Clock(..))
     }
 
     /// Gives it to a body: place of its source, and its own among those of the source.
@@ -200,14 +207,17 @@ pub(super) struct Arrival {
 
 /// Subscribes to the topic of one body.
 ///
+/// * `patience` - how long to wait for room among new readers.
+///
 /// # Errors
 /// `Error::Io` when DDS refuses.
 pub(super) fn of_body(
-    node: &mut Node,
-    context: &Context,
+    (node, context): (&mut Node, &Context),
     kind: RosKind,
     topic: &str,
+    patience: Duration,
 ) -> Result<Line> {
+    let quality = In { patience, ..NEWEST };
     let feeder = Feeder {
         source: usize::MAX,
         member: usize::MAX,
@@ -217,10 +227,10 @@ pub(super) fn of_body(
     };
     Ok(if kind == RosKind::Pose {
         let kind = ("geometry_msgs", "PoseStamped");
-        Line::Pose(subscription(node, context, (topic, kind), NEWEST)?, feeder)
+        Line::Pose(subscription(node, context, (topic, kind), quality)?, feeder)
     } else {
         let kind = ("nav_msgs", "Odometry");
-        Line::Odometry(subscription(node, context, (topic, kind), NEWEST)?, feeder)
+        Line::Odometry(subscription(node, context, (topic, kind), quality)?, feeder)
     })
 }
 
@@ -254,7 +264,8 @@ pub(super) fn subscribe(
     let kind = ("rosgraph_msgs", "Clock");
     let clock = subscription(node, context, (&clock, kind), NEWEST)?;
     let clock = Line::Clock(clock, Order::default(), Heard::default());
-    let mut lines = vec![Line::Transforms(own), clock];
+    // The clock first: what comes in one round with a time is stamped with that.
+    let mut lines = vec![clock, Line::Transforms(own)];
     let mut odd = Vec::new();
     let mut trees: Vec<(String, bool, Vec<usize>)> = Vec::new();
     // Bodies last: one that an edit has brought must not take a topic away that the scene says.
@@ -273,7 +284,9 @@ pub(super) fn subscribe(
     for (place, source) in others {
         for (member, given) in source.topics().enumerate() {
             let full = names.claim_for_body(given).map_err(Error::Usage);
-            match full.and_then(|full| of_body(node, context, source.kind, &full)) {
+            let subscribed = full
+                .and_then(|full| of_body((&mut *node, context), source.kind, &full, In::AT_START));
+            match subscribed {
                 Ok(mut line) => {
                     line.feed(place, member);
                     lines.push(line);

@@ -2,6 +2,8 @@
 //! ids that stay (boxes, contact points, normals, pairs not decided), each within a message of 128 KB; where they do
 //! not hold all there is, a text that says so. Pure.
 
+mod kept;
+
 use std::collections::BTreeMap;
 
 use super::parcel::Parcel;
@@ -12,6 +14,7 @@ use crate::wire::ros::{
 };
 use crate::wire::ros::{Header, Quaternion};
 use crate::wire::{BodyRow, BodyStatus, ContactKind, ContactRow, Verdict};
+pub(super) use kept::kept_ns;
 
 /// Boxes drawn: of the bodies of worst verdict first; each is 24 points with a colour, 1 KB.
 const BOXES_MAX: usize = 80;
@@ -27,9 +30,6 @@ const POINT_M: f64 = 0.02;
 const NORMAL_M: f64 = 0.1;
 /// Height of letters, metres.
 const TEXT_M: f64 = 0.1;
-/// A marker stays for so many of its periods without a new one.
-const PERIODS_KEPT: u64 = 3;
-
 /// A body's box in its own frame: centre and half extents, metres.
 pub(super) type Boxes = BTreeMap<u64, ([f64; 3], [f64; 3])>;
 
@@ -45,14 +45,15 @@ const BLUE: ColorRgba = colour(0.2, 0.4, 1.0);
 const WHITE: ColorRgba = colour(1.0, 1.0, 1.0);
 
 /// The markers of a tick.
+///
+/// * `kept_ns` - how long they stay, see [`kept_ns`].
 pub(super) fn markers(
     speaker: &Speaker,
     parcel: &Parcel,
     boxes: &Boxes,
-    period_ns: u64,
+    kept_ns: u64,
 ) -> MarkerArray {
     let header = speaker.header(parcel.tick.header.oldest_stamp_ns);
-    let kept_ns = period_ns.saturating_mul(PERIODS_KEPT);
     let blank = |ns: &str, kind, scale_m: f64, colour| Marker {
         header: header.clone(),
         ns: ns.to_owned(),
@@ -290,7 +291,7 @@ mod tests {
     #[test]
     fn each_layer_is_one_list_marker_whose_id_stays() {
         let boxes: Boxes = (1..=200).map(|id| (id, ([0.0; 3], [1.0; 3]))).collect();
-        let all = markers(&Speaker::default(), &parcel(200), &boxes, 100_000_000).markers;
+        let all = markers(&Speaker::default(), &parcel(200), &boxes, 300_000_000).markers;
         let seen: Vec<_> = all
             .iter()
             .map(|m| (m.ns.as_str(), m.id, m.points.len()))

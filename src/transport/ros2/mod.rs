@@ -19,6 +19,7 @@ mod inlet;
 mod lines;
 mod markers;
 mod mend;
+mod misfits;
 pub mod names;
 mod namesakes;
 mod node;
@@ -89,8 +90,12 @@ pub struct RosSourceSpec {
 impl RosScene {
     /// Follows an edit.
     fn follow(&mut self, change: &BodyChange) {
-        let (BodyChange::Put(BodyNote { name, .. }) | BodyChange::Removed(name)) = change;
-        self.bodies.retain(|body| body.name != *name);
+        if let BodyChange::Hung { name, attached } = change {
+            let body = self.bodies.iter_mut().find(|body| body.name == *name);
+            body.into_iter().for_each(|body| body.attached = *attached);
+            return;
+        }
+        self.bodies.retain(|body| body.name != change.name());
         if let BodyChange::Put(body) = change {
             self.bodies.push(body.clone());
         }

@@ -24,7 +24,7 @@ use serde::Serialize;
 pub(super) use unsent::Unsent;
 
 use super::diagnose::Diagnoser;
-use super::markers::{Boxes, CONTACTS_MAX, collisions, markers};
+use super::markers::{Boxes, CONTACTS_MAX, collisions, kept_ns, markers};
 use super::names::Names;
 use super::namesakes::Namesakes;
 use super::noise::{Noise, unknown_participants};
@@ -65,6 +65,8 @@ pub(super) struct Outlet {
     pub(super) told_ns: u64,
     /// When markers were last sent, nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) shown_ns: u64,
+    /// The daemon's, nanoseconds.
+    pub(super) heartbeat_ns: u64,
     pub(super) boxes: Boxes,
     /// Contacts that the newest `~/collisions` does not hold.
     pub(super) left_out: u64,
@@ -112,7 +114,9 @@ impl Outlet {
             }
             self.diagnose();
             let strange = self.strangers.watch(SystemClock.boottime_ns());
-            for text in self.namesakes.look().into_iter().chain(strange) {
+            let misfits = self.readers.misfits.take_new();
+            let own = self.namesakes.look().into_iter();
+            for text in own.chain(strange).chain(misfits) {
                 self.shared.say(Say::Warn, &text);
             }
             let holds = self.hand_over();
@@ -209,10 +213,11 @@ impl Outlet {
             return;
         };
         let now_ns = pen.means.now_ns;
-        let due = now_ns.saturating_sub(self.shown_ns) >= period_ns;
-        if self.read.markers && parcel.holds.bodies && due {
+        let since_ns = now_ns.saturating_sub(self.shown_ns);
+        if self.read.markers && parcel.holds.bodies && since_ns >= period_ns {
             self.shown_ns = now_ns;
-            let message = markers(&self.speaker, parcel, &self.boxes, period_ns);
+            let kept_ns = kept_ns(period_ns, self.heartbeat_ns, since_ns);
+            let message = markers(&self.speaker, parcel, &self.boxes, kept_ns);
             pen.write(&mut self.publishers.markers, message);
         }
     }
@@ -238,6 +243,7 @@ impl Outlet {
         };
         let mut faults = self.shared.faults();
         faults.extend_from_slice(self.strangers.found());
+        faults.extend(self.readers.misfits.found());
         faults.extend(open_files::short());
         faults.extend(self.unsent.words.clone());
         if self.left_out > 0 {

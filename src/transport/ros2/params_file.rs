@@ -211,10 +211,14 @@ fn value(yaml: &Yaml) -> Option<Value> {
         Yaml::Boolean(flag) => Some(Value::Flag(*flag)),
         Yaml::Integer(whole) => Some(Value::Whole(*whole)),
         Yaml::Real(_) => yaml.as_f64().map(Value::Real),
-        // YAML 1.1, which ROS reads, has these too.
+        // Those that rcl takes beside true and false.
         Yaml::String(text) => Some(match text.as_str() {
-            "yes" | "on" | "True" | "TRUE" => Value::Flag(true),
-            "no" | "off" | "False" | "FALSE" => Value::Flag(false),
+            "Y" | "y" | "yes" | "Yes" | "YES" | "True" | "TRUE" | "on" | "On" | "ON" => {
+                Value::Flag(true)
+            }
+            "N" | "n" | "no" | "No" | "NO" | "False" | "FALSE" | "off" | "Off" | "OFF" => {
+                Value::Flag(false)
+            }
             _ => Value::Text(text.clone()),
         }),
         Yaml::Array(list) => list
@@ -300,6 +304,21 @@ mod tests {
                 ),
             ]
         );
+    }
+
+    #[test]
+    fn bug_some_words_that_rcl_takes_as_truth_values_were_texts() {
+        for (words, flag) in [
+            ("Y y yes Yes YES true True TRUE on On ON", true),
+            ("N n no No NO false False FALSE off Off OFF", false),
+        ] {
+            for word in words.split(' ') {
+                assert_eq!(parse_value(word).unwrap(), Value::Flag(flag), "{word}");
+            }
+        }
+        for word in ["yES", "oN", "none"] {
+            assert!(matches!(parse_value(word), Ok(Value::Text(_))), "{word}");
+        }
     }
 
     #[test]

@@ -3,23 +3,24 @@
 //! publishers, no clock.
 
 mod judge;
+mod links;
 mod roster;
 mod stamps;
 
 use judge::judge;
 pub(super) use stamps::off;
-use stamps::{Passing, both, crowded, forgotten, older, refused, rivalry};
+use stamps::{Passing, older};
 
 use ros2_client::Gid;
 
 use super::RosScene;
 use super::order::{Order, Step};
 use super::shelf::{Seat, Update};
-use super::tf::{Found, Missing, Taken, Tree, no_pose, plain, sound};
+use super::tf::{Found, Missing, Tree, no_pose, plain, sound};
 use super::told::brief;
 use crate::config::RosKind;
 use crate::math::{Quat, Vec3, pose_from};
-use crate::wire::ros::{Odometry, PoseStamped, TfMessage};
+use crate::wire::ros::{Odometry, PoseStamped};
 use crate::wire::{RejectReason, SOURCE_NAME_LEN, TransformRow, name_bytes};
 
 /// When and how a message came.
@@ -39,6 +40,7 @@ pub(super) struct Receipt {
 const NOBODY: Seat = Seat {
     body: 0,
     continuous: false,
+    attached: false,
 };
 
 /// One body of a source of common topics.
@@ -95,8 +97,7 @@ impl Source {
         let mut all = Vec::new();
         for (place, spec) in scene.sources.iter().enumerate() {
             let Some(ros) = &spec.ros2 else { continue };
-            let mut tree = Tree::default();
-            let root = tree.pin(&scene.frame_id);
+            let (mut tree, root) = Tree::rooted(&scene.frame_id);
             let bodies = scene.bodies.iter().filter(|b| b.source == Some(place));
             let members = bodies.map(|body| Member::of(body, &mut tree)).collect();
             all.push(Self {
@@ -129,10 +130,10 @@ impl Source {
         self.members.iter().map(|member| member.topic.as_str())
     }
 
-    /// What is wrong with its bodies now, at most `most` of them.
+    /// What is wrong with its bodies now, at most `most` of them. One that hangs on another is not its to move.
     pub(super) fn faults(&self, most: usize, now_ns: u64) -> Vec<String> {
         let members = self.members.iter();
-        let members = members.filter(|member| member.seat != NOBODY);
+        let members = members.filter(|member| member.seat != NOBODY && !member.seat.attached);
         let faulty = members.filter_map(|member| {
             let fault = member.fault.clone();
             let fault = fault.or_else(|| self.silence(member, now_ns))?;
@@ -154,47 +155,6 @@ impl Source {
             member.order = Order::default();
             (member.last, member.since_ns) = (None, None);
         }
-    }
-
-    /// Takes the links of a message.
-    ///
-    /// * returns - whether the senders' time went back.
-    pub(super) fn take_links(
-        &mut self,
-        message: &TfMessage,
-        fixed: bool,
-        receipt: Receipt,
-    ) -> bool {
-        let mut back = false;
-        for link in &message.transforms {
-            let what = ("frame", link.child_frame_id.as_str());
-            let stamp_ns = link.header.stamp.to_ns();
-            let mixed = self.tree.is_otherwise(what.1, fixed).then(|| both(what));
-            let taken = self.tree.take(link, fixed, receipt.now_ns, self.timeout_ns);
-            let odd = match taken {
-                Taken::Newer if !fixed => off(what, stamp_ns, receipt, self.timeout_ns),
-                Taken::Older(by_ns) => Some(older(what, by_ns)),
-                Taken::Full => Some(crowded(what)),
-                Taken::Refused(why) => Some(refused(what, why)),
-                Taken::Newer | Taken::WentBack => None,
-            };
-            // Those that never change are said again by whoever starts anew.
-            let is_in = !matches!(taken, Taken::Refused(_) | Taken::Full);
-            let rivals = !fixed && is_in && self.tree.hear(what.1, receipt.from, receipt.now_ns);
-            let odd = mixed.filter(|_| is_in).or(odd);
-            let odd = if rivals { Some(rivalry(what)) } else { odd };
-            back |= taken == Taken::WentBack;
-            self.refused += u64::from(!matches!(taken, Taken::Newer | Taken::WentBack));
-            self.tell(odd, receipt);
-        }
-        let let_go = self.tree.take_let_go();
-        self.tell((let_go > 0).then(|| forgotten(let_go)), receipt);
-        if back {
-            self.members
-                .iter_mut()
-                .for_each(|member| member.last = None);
-        }
-        back
     }
 
     /// The poses of bodies whose chains have changed since the last look, or are due for a word.

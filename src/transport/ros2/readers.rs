@@ -1,5 +1,5 @@
 //! Who reads what this node writes. In: what DDS says of endpoints that match and that go. Out: counts; and who was
-//! lost and is back, which DDS says to the same listener.
+//! lost and is back, and whose quality of service does not go with this node's, which DDS says to the same listener.
 //!
 //! DDS says it once, to one listener, in a queue of 2048: this is the only one, and it is asked at each turn of the
 //! sending thread, ten times a second at least.
@@ -8,18 +8,21 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use ros2_client::{Context, Publisher};
 use rustdds::{
-    DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, LostReason,
+    DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, LostReason, QosPolicies,
     StatusEvented as _,
 };
 use serde::Serialize;
 
 use super::absent::Absent;
+use super::misfits::{Misfits, Remote};
 
 /// Readers of each writer.
 pub(super) struct Readers {
     listener: DomainParticipantStatusListener,
     of: BTreeMap<GUID, Matched>,
     pub(super) absent: Absent,
+    pub(super) misfits: Misfits,
+    context: Context,
 }
 
 /// Readers of one writer.
@@ -37,6 +40,8 @@ impl Readers {
             listener: context.domain_participant().status_listener(),
             of: BTreeMap::new(),
             absent: Absent::default(),
+            misfits: Misfits::default(),
+            context: context.clone(),
         }
     }
 
@@ -50,16 +55,40 @@ impl Readers {
                     local_writer,
                     remote_reader,
                 } => {
+                    self.fit((local_writer, remote_reader));
                     let matched = self.of.entry(local_writer).or_default();
                     matched.readers.insert(remote_reader);
                     matched.newest_ns = now_ns;
                 }
-                DomainParticipantStatusEvent::ReaderLost { guid, .. } => {
-                    self.lose(|reader| *reader == guid);
+                DomainParticipantStatusEvent::RemoteWriterMatched {
+                    local_reader,
+                    remote_writer,
+                } => self.fit((local_reader, remote_writer)),
+                DomainParticipantStatusEvent::RemoteReaderQosIncompatible {
+                    local_writer,
+                    remote_reader,
+                    requested_qos,
+                    offered_qos,
+                } => {
+                    let two = (local_writer, remote_reader);
+                    self.note_misfit(two, Remote::Subscriber, (&offered_qos, &requested_qos));
+                }
+                DomainParticipantStatusEvent::RemoteWriterQosIncompatible {
+                    local_reader,
+                    remote_writer,
+                    requested_qos,
+                    offered_qos,
+                } => {
+                    let two = (local_reader, remote_writer);
+                    self.note_misfit(two, Remote::Publisher, (&offered_qos, &requested_qos));
+                }
+                DomainParticipantStatusEvent::ReaderLost { guid, .. }
+                | DomainParticipantStatusEvent::WriterLost { guid, .. } => {
+                    self.lose(|endpoint| *endpoint == guid);
                 }
                 // Who was killed or fell silent takes all its readers with it, and nothing is said of each.
                 DomainParticipantStatusEvent::ParticipantLost { id, reason } => {
-                    self.lose(|reader| reader.prefix == id);
+                    self.lose(|endpoint| endpoint.prefix == id);
                     let prefix = format!("{id:?}");
                     match reason {
                         LostReason::Timeout { lease, .. } => {
@@ -79,6 +108,42 @@ impl Readers {
     /// Forgets a writer that was given up.
     pub(super) fn forget(&mut self, writer: GUID) {
         self.of.remove(&writer);
+        self.misfits.lose(|local, _| *local == writer);
+    }
+
+    /// Two go together, whatever was said of them before.
+    fn fit(&mut self, two: (GUID, GUID)) {
+        self.misfits.lose(|local, remote| (*local, *remote) == two);
+    }
+
+    /// Two do not go together. DDS says it again whenever the other one announces itself, and its topic is looked for
+    /// once, among all that DDS knows.
+    fn note_misfit(
+        &mut self,
+        two: (GUID, GUID),
+        remote: Remote,
+        qualities: (&QosPolicies, &QosPolicies),
+    ) {
+        if self.misfits.holds(two) {
+            return;
+        }
+        let participant = self.context.domain_participant();
+        let topic = match remote {
+            Remote::Publisher => {
+                let mut writers = participant.discovered_writers().into_iter();
+                let of = writers.find(|data| data.publication_topic_data.key == two.1);
+                of.map(|data| data.publication_topic_data.topic_name)
+            }
+            Remote::Subscriber => {
+                let mut readers = participant.discovered_readers().into_iter();
+                let of = readers.find(|data| data.subscription_topic_data.key() == two.1);
+                of.map(|data| data.subscription_topic_data.topic_name().clone())
+            }
+        };
+        // One that is not known is gone by now.
+        if let Some(topic) = topic {
+            self.misfits.put(two, (&topic, remote), qualities);
+        }
     }
 
     #[cfg(test)]
@@ -87,6 +152,7 @@ impl Readers {
     }
 
     fn lose(&mut self, gone: impl Fn(&GUID) -> bool) {
+        self.misfits.lose(|_, remote| gone(remote));
         self.of.retain(|_, matched| {
             matched.readers.retain(|reader| !gone(reader));
             !matched.readers.is_empty()
@@ -116,5 +182,42 @@ impl Readers {
         };
         let own = self.of.get(&writer.guid());
         own.is_some_and(|own| own.readers.is_superset(&wanted.readers))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::disallowed_methods, reason = "real DDS needs real time")]
+
+    use std::time::{Duration, Instant};
+
+    use super::super::topics::{Out, publisher};
+    use super::super::wheel::tests::{TOPIC, domain, peer, reader};
+    use super::*;
+    use crate::wire::ros::State;
+
+    #[test]
+    fn bug_a_volatile_publisher_beside_a_latched_reader_was_told_nowhere() {
+        let (context, mut node) = peer(domain(7), "reads");
+        let mut readers = Readers::of(&context);
+        let _from = reader(&context, &mut node, true);
+        let (far, mut far_node) = peer(domain(7), "writes");
+        let writer = publisher::<State>(&mut far_node, &far, TOPIC, Out::RELIABLE).unwrap();
+        let end = Instant::now() + Duration::from_secs(60);
+        let mut until = |count: usize| {
+            while readers.misfits.found().len() != count {
+                assert!(Instant::now() < end, "{count}");
+                std::thread::sleep(Duration::from_millis(10));
+                readers.hear(1);
+            }
+            readers.misfits.take_new()
+        };
+        let told = until(1).concat();
+        assert!(
+            told.contains("topic /wheel: a publisher offers volatile"),
+            "{told}"
+        );
+        drop(writer);
+        assert!(until(0).is_empty());
     }
 }

@@ -26,7 +26,7 @@ use super::names::Names;
 use super::open;
 use super::reply;
 use super::shared::{Say, Shared};
-use super::topics::{TypeName, failed};
+use super::topics::{In, TypeName, failed, patiently};
 use crate::error::{Error, Result};
 use crate::wire::ros::{
     AttachBody, Edited, EnableBody, Gap, GapTold, PutBody, RemoveBody, Reset, SetFilter, TickNow,
@@ -315,13 +315,30 @@ pub(super) fn server<Q: Message + Clone + 'static, R: Message + 'static>(
     (package, kind): TypeName,
 ) -> Result<Server<Q, R>> {
     let full = names.claim(name).map_err(Error::Usage)?;
-    let parsed = Name::parse(&full).map_err(|e| Error::Usage(format!("{full}: {e}")))?;
+    let parsed = service_name(&full, names.namespace())?;
     let qos = QosProfile::publisher_default()
         .history(History::KeepLast { depth: DEPTH })
         .reliability_reliable(WhenFull::Fail);
     let kind = ServiceTypeName::new(package, kind);
-    node.create_server(mapping, &parsed, &kind, qos.clone(), qos)
-        .map_err(|e| failed(&full, e))
+    let make = || node.create_server(mapping, &parsed, &kind, qos.clone(), qos.clone());
+    patiently(In::AT_START, make).map_err(|e| failed(&full, e))
+}
+
+/// A full name as ros2-client takes it: behind the node's namespace, which alone may have two `_` in a row there.
+///
+/// # Errors
+/// `Error::Usage` for a name that has them elsewhere.
+fn service_name(full: &str, namespace: &str) -> Result<Name> {
+    let root = namespace.trim_end_matches('/');
+    let behind = full
+        .strip_prefix(root)
+        .and_then(|own| own.strip_prefix('/'));
+    let own = behind.filter(|_| !root.is_empty()).unwrap_or(full);
+    Name::parse(own).map_err(|_| {
+        Error::Usage(format!(
+            "{full} cannot be the name of a service here: write no two _ in a row behind the namespace"
+        ))
+    })
 }
 
 /// Has the thread that waits on the registry woken by requests.
@@ -348,5 +365,31 @@ pub(super) fn receive<Q: Message + 'static, R: Message + 'static>(
             Ok(None) => return,
             Err(_) => shared.note_undecodable(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ros2_client::NodeName;
+
+    use super::*;
+
+    #[test]
+    fn bug_services_of_a_namespace_with_two_underscores_could_not_be_opened() {
+        for namespace in ["/", "/cell", "/robot__1", "/a/robot__1"] {
+            let root = namespace.trim_end_matches('/');
+            let node = NodeName::new(namespace, "sweepd").unwrap();
+            for own in ["sweepd/gap", "gap"] {
+                let full = format!("{root}/{own}");
+                let name = service_name(&full, namespace).unwrap();
+                let on_dds = name.to_dds_name("rq", &node, "Request");
+                assert_eq!(on_dds, format!("rq{full}Request"));
+            }
+        }
+        let elsewhere = service_name("/other/gap", "/cell").unwrap();
+        assert!(elsewhere.is_absolute());
+        assert!(service_name("/cellar/gap", "/cell").unwrap().is_absolute());
+        let why = service_name("/cell/my__gap", "/cell").unwrap_err();
+        assert!(why.to_string().contains("/cell/my__gap cannot be the name"));
     }
 }

@@ -39,6 +39,8 @@ pub(super) struct Seat {
     pub(super) body: u64,
     /// Whether each of its poses is a part of its way, so that one that gave way to a newer one is missing.
     pub(super) continuous: bool,
+    /// Whether it hangs on another body: its poses say nothing, only that its source lives.
+    pub(super) attached: bool,
 }
 
 impl Seat {
@@ -46,6 +48,7 @@ impl Seat {
         Self {
             body: body.id,
             continuous: body.continuous,
+            attached: body.attached,
         }
     }
 }
@@ -166,7 +169,7 @@ impl Shelf {
             // The very same, said again, is no part of a way.
             let is_other = (old.result, old.stamp_ns) != (update.result, update.stamp_ns);
             let seat = group.seats.get(update.member);
-            let goes_on = seat.is_some_and(|seat| seat.continuous);
+            let goes_on = seat.is_some_and(|seat| seat.continuous && !seat.attached);
             group.missing += u64::from(goes_on && is_other && old.result.is_ok());
         }
     }
@@ -267,11 +270,13 @@ impl Group {
             let Some(update) = update else {
                 return true;
             };
-            let Seat { body, .. } = self.seats.get(member).copied().unwrap_or_default();
+            let Seat { body, attached, .. } = self.seats.get(member).copied().unwrap_or_default();
             received_ns = received_ns.min(update.received_ns);
             since_ns = since_ns.max(update.since_ns);
             stamp_ns = stamp_ns.max(update.stamp_ns);
             match update.result {
+                // The daemon would refuse it, in each tick, and nobody could end that.
+                _ if attached => {}
                 Ok(row) => {
                     frame.transforms.push(TransformRow { body, ..row });
                     frame.stamps_ns.push(update.stamp_ns);

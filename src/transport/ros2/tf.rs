@@ -1,8 +1,9 @@
-//! The tree of `/tf`: links between frames, and the pose of a frame by its chain of links to the scene's frame.
+//! The tree of `/tf`: links between frames, and what becomes of each that comes; poses by chains of links: `chain`.
 //!
-//! In: links as they come, frames of bodies. Out: poses with the stamps of their chains, or why there is none. Pure: no
-//! DDS beyond the names of publishers.
+//! In: links as they come, frames of bodies. Out: the newest link of each frame. Pure: no DDS beyond the names of
+//! publishers.
 
+mod chain;
 mod room;
 
 use std::collections::BTreeMap;
@@ -15,10 +16,9 @@ use crate::limits::QUATERNION_NORM_TOLERANCE;
 use crate::math::{Pose, pose_from};
 use crate::wire::RejectReason;
 use crate::wire::ros::TransformStamped;
+pub(super) use crate::wire::ros::plain_frame as plain;
+pub(super) use chain::{Found, Missing};
 use room::FRAME_NAME_BYTES_MAX;
-
-/// Links of one chain; a longer one is as good as a loop.
-const CHAIN_MAX: usize = 256;
 
 /// A link: where a frame is in its parent.
 #[derive(Clone, Debug)]
@@ -47,38 +47,12 @@ pub(super) enum Taken {
     Newer,
     /// One with a stamp later by so much is there already, nanoseconds; it is passed over.
     Older(u64),
-    /// Its sender's time began anew.
+    /// Its sender's time began anew, and a body hangs on it.
     WentBack,
     /// It links no two frames, and why.
     Refused(&'static str),
     /// A frame too many.
     Full,
-}
-
-/// Where a frame is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Found {
-    /// Position in the scene's frame, metres.
-    pub(super) position: [f64; 3],
-    /// Orientation x, y, z, w.
-    pub(super) orientation: [f64; 4],
-    /// Oldest stamp of the chain's links that have an age; 0: none has.
-    pub(super) stamp_ns: u64,
-    /// How far the stamps lie apart, nanoseconds.
-    pub(super) skew_ns: u64,
-    /// Latest and earliest receipt of links that have an age, nanoseconds of `CLOCK_BOOTTIME`; `None`: none has.
-    pub(super) received_ns: Option<(u64, u64)>,
-}
-
-/// Why a frame has no pose.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Missing {
-    /// The chain ends at this frame, which nobody has linked yet.
-    Frame(String),
-    /// The chain comes back to this frame.
-    Loop(String),
-    /// The link of this frame has numbers that are no pose.
-    Bad(String, RejectReason),
 }
 
 /// A frame that a body has or that was heard of.
@@ -88,6 +62,8 @@ struct Frame {
     link: Option<Link>,
     /// Who sends its link.
     heard: Heard,
+    /// Who sent it as one that never changes.
+    fixed_by: Option<Gid>,
     /// How many bodies, and the scene, have it as theirs: it stays while there is one.
     pins: usize,
 }
@@ -101,6 +77,8 @@ pub(super) struct Tree {
     free: Vec<usize>,
     /// Frames that bodies or the scene have.
     pinned: usize,
+    /// The scene's frame; `None`: not said.
+    root: Option<usize>,
     /// Links refused since room was last made.
     denied: usize,
     /// Links that never change which had to go.
@@ -109,12 +87,15 @@ pub(super) struct Tree {
     looks: u64,
 }
 
-/// tf2 knows no slash in front; old senders write it.
-pub(super) fn plain(frame: &str) -> &str {
-    frame.strip_prefix('/').unwrap_or(frame)
-}
-
 impl Tree {
+    /// An empty one, and the number of the scene's frame in it.
+    pub(super) fn rooted(frame: &str) -> (Self, usize) {
+        let mut tree = Self::default();
+        let root = tree.pin(frame);
+        tree.root = Some(root);
+        (tree, root)
+    }
+
     /// The number of a frame that a body or the scene has. It is never refused, and stays until it is unpinned: the
     /// scene bounds how many there are.
     pub(super) fn pin(&mut self, frame: &str) -> usize {
@@ -165,6 +146,28 @@ impl Tree {
         let id = self.ids.get(plain(child));
         let link = id.and_then(|id| self.link(*id));
         link.is_some_and(|link| link.fixed != fixed)
+    }
+
+    /// Whether a fixed link differs from that of its frame which another publisher sent.
+    pub(super) fn is_disputed(&self, link: &TransformStamped, from: Gid) -> bool {
+        let id = self.ids.get(plain(&link.child_frame_id));
+        let Some((frame, old)) = id.and_then(|&id| Some((self.frames.get(id)?, self.link(id)?)))
+        else {
+            return false;
+        };
+        let parent = self.frames.get(old.parent).map(|parent| &*parent.name);
+        let position = link.transform.translation.into();
+        let is_same = parent == Some(plain(&link.header.frame_id))
+            && (old.position, old.orientation) == (position, link.transform.rotation.into());
+        old.fixed && !is_same && frame.fixed_by.is_some_and(|by| by != from)
+    }
+
+    /// A publisher has sent a fixed link of a frame, and it was taken.
+    pub(super) fn note_fixed(&mut self, child: &str, from: Gid) {
+        let id = self.ids.get(plain(child));
+        if let Some(frame) = id.and_then(|id| self.frames.get_mut(*id)) {
+            frame.fixed_by = Some(from);
+        }
     }
 
     /// Bodies are looked for: what came until now is no news any more.
@@ -221,10 +224,12 @@ impl Tree {
             match step {
                 Step::On => {}
                 Step::Late(by_ns) => return Taken::Older(by_ns),
-                Step::Anew => {
+                // The clock of a frame that no body hangs on, such as what a camera detects, is nothing to bodies.
+                Step::Anew if self.is_needed(child) => {
                     taken = Taken::WentBack;
                     self.forget();
                 }
+                Step::Anew => {}
             }
         }
         let position = link.transform.translation.into();
@@ -244,60 +249,6 @@ impl Tree {
             frame.link = Some(new);
         }
         taken
-    }
-
-    /// Where `frame` is in `root`.
-    ///
-    /// A single link is handed on as it came, so that its pose is bit by bit what the sender wrote.
-    pub(super) fn find(&self, frame: usize, root: usize) -> Result<Found, Missing> {
-        let name = |at: usize| {
-            let frame = self.frames.get(at);
-            frame.map(|frame| frame.name.clone()).unwrap_or_default()
-        };
-        let (mut at, mut pose, mut single) = (frame, None::<Pose>, None);
-        let (mut oldest, mut newest) = (u64::MAX, 0);
-        let (mut earliest, mut latest) = (u64::MAX, 0);
-        for length in 0.. {
-            if at == root {
-                break;
-            }
-            if length == CHAIN_MAX {
-                return Err(Missing::Loop(name(at)));
-            }
-            let Some(link) = self.link(at) else {
-                return Err(Missing::Frame(name(at)));
-            };
-            let Some(own) = link.pose else {
-                let reason = sound(link.position, link.orientation).err();
-                return Err(Missing::Bad(
-                    name(at),
-                    reason.unwrap_or(RejectReason::NotFinite),
-                ));
-            };
-            if !link.fixed {
-                (oldest, newest) = (oldest.min(link.stamp_ns), newest.max(link.stamp_ns));
-                earliest = earliest.min(link.received_ns);
-                latest = latest.max(link.received_ns);
-            }
-            single = pose.is_none().then_some((link.position, link.orientation));
-            pose = Some(pose.map_or(own, |inner| own * inner));
-            at = link.parent;
-        }
-        let pose = pose.unwrap_or_else(Pose::identity);
-        let turned = pose.rotation.coords;
-        let composed = (
-            [pose.translation.x, pose.translation.y, pose.translation.z],
-            [turned.x, turned.y, turned.z, turned.w],
-        );
-        let (position, orientation) = single.unwrap_or(composed);
-        let aged = oldest != u64::MAX;
-        Ok(Found {
-            position,
-            orientation,
-            stamp_ns: if aged { oldest } else { 0 },
-            skew_ns: newest.saturating_sub(oldest),
-            received_ns: aged.then_some((latest, earliest)),
-        })
     }
 }
 

@@ -52,13 +52,30 @@ pub(super) fn gist(words: &str) -> String {
     gist
 }
 
-/// A name for people: the head of one that is too long.
+/// A name for people: the head of one that is too long, on one line.
 pub(super) fn brief(name: &str) -> Cow<'_, str> {
     if name.len() <= NAME_BYTES_MAX {
-        return Cow::Borrowed(name);
+        return plain(name);
     }
     let head = name.get(..name.floor_char_boundary(NAME_BYTES_MAX));
-    Cow::Owned(format!("{}..", head.unwrap_or_default()))
+    Cow::Owned(format!("{}..", plain(head.unwrap_or_default())))
+}
+
+/// Control characters as they are written in code: a peer's line feed would begin a line of the log, and an escape
+/// speaks to the terminal.
+fn plain(name: &str) -> Cow<'_, str> {
+    if !name.contains(char::is_control) {
+        return Cow::Borrowed(name);
+    }
+    let mut shown = String::with_capacity(2 * name.len());
+    for c in name.chars() {
+        if c.is_control() {
+            shown.extend(c.escape_default());
+        } else {
+            shown.push(c);
+        }
+    }
+    Cow::Owned(shown)
 }
 
 #[cfg(test)]
@@ -101,5 +118,12 @@ mod tests {
             brief(&long),
             format!("{}..", "x".repeat(NAME_BYTES_MAX - 1))
         );
+    }
+
+    #[test]
+    fn bug_a_peers_line_feed_began_a_line_of_the_log() {
+        assert_eq!(brief("a\nERROR b\u{1b}[2J é"), "a\\nERROR b\\u{1b}[2J é");
+        let long = "\n".repeat(10 * NAME_BYTES_MAX);
+        assert_eq!(brief(&long), format!("{}..", "\\n".repeat(NAME_BYTES_MAX)));
     }
 }

@@ -9,6 +9,7 @@ use serde::de::DeserializeOwned;
 use std::time::Duration;
 
 use crate::error::{Error, Result};
+use crate::time::{Clock as _, SystemClock};
 
 /// Bytes of unacknowledged messages that one reliable topic may keep: a reader that has stopped is given up by its
 /// lease after 20 s, and until then must cost no more than this.
@@ -17,6 +18,13 @@ const UNACKED_BYTES_MAX: usize = 8 << 20;
 const UNACKED_MAX: usize = 1 << 14;
 /// Lease of liveliness, offered where silence must be told: shorter ones flap, because the crate asserts once a second.
 const LEASE: Duration = Duration::from_secs(3);
+
+/// Between two tries of a reader for which DDS has no room yet, which empties a full queue in about that time. Each that
+/// fails is taken back through a queue of four, which may block for 20 ms.
+const AGAIN: Duration = Duration::from_millis(10);
+/// What DDS says of it. New readers wait for its thread in a queue of 100 (rustdds 0.15), and one more is refused at
+/// once; new writers wait until they are taken.
+const FULL: &str = "full channel";
 
 /// A topic's package and type, such as `sweepd_msgs` and `Tick`.
 pub(super) type TypeName = (&'static str, &'static str);
@@ -83,9 +91,16 @@ pub(super) struct In {
     pub(super) latched: bool,
     /// Messages that may wait.
     pub(super) depth: usize,
+    /// How long to wait for room among the new readers that DDS has not taken yet.
+    pub(super) patience: Duration,
 }
 
 impl In {
+    /// Before the first tick, for which nobody waits.
+    pub(super) const AT_START: Duration = Duration::from_secs(2);
+    /// Beside ticks, which the same thread publishes: one more try.
+    pub(super) const BESIDE_TICKS: Duration = Duration::from_millis(6);
+
     fn profile(self) -> QosProfile {
         let profile =
             QosProfile::subscription_default().history(History::KeepLast { depth: self.depth });
@@ -138,8 +153,37 @@ pub(super) fn subscription<M: DeserializeOwned + 'static>(
 ) -> Result<Subscription<M>> {
     let qos = QosPolicies::from(quality.profile());
     let topic = topic(context, full, kind, &qos)?;
-    node.create_subscription(&topic, None)
+    patiently(quality.patience, || node.create_subscription(&topic, None))
         .map_err(|e| failed(full, e))
+}
+
+/// Makes something with a reader, and again while DDS has no room for another new one.
+///
+/// # Errors
+/// Those of the last try.
+pub(super) fn patiently<T, E: std::fmt::Display>(
+    patience: Duration,
+    mut make: impl FnMut() -> std::result::Result<T, E>,
+) -> std::result::Result<T, E> {
+    let begun_ns = SystemClock.boottime_ns();
+    loop {
+        let made = make();
+        let waited_ns = SystemClock.boottime_ns().saturating_sub(begun_ns);
+        match &made {
+            Err(e) if u128::from(waited_ns) < patience.as_nanos() && is_full(e) => {
+                #[allow(
+                    clippy::disallowed_methods,
+                    reason = "DDS has nothing to wait on; no tick waits for this thread"
+                )]
+                std::thread::sleep(AGAIN);
+            }
+            _ => return made,
+        }
+    }
+}
+
+fn is_full(e: &impl std::fmt::Display) -> bool {
+    e.to_string().contains(FULL)
 }
 
 fn topic(
@@ -158,4 +202,39 @@ fn topic(
 /// What DDS said of a topic or service.
 pub(super) fn failed(name: &str, e: impl std::error::Error + Send + Sync + 'static) -> Error {
     Error::io(format!("ROS 2: {name} cannot be opened"), e)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lines::of_body;
+    use super::super::wheel::tests::{domain, peer};
+    use super::*;
+    use crate::config::RosKind;
+
+    #[test]
+    fn bug_a_scene_of_more_bodies_than_dds_has_room_for_new_readers_did_not_open() {
+        let (context, mut node) = peer(domain(6), "many");
+        let mut lines = Vec::new();
+        for number in 0..180 {
+            let (with, topic) = ((&mut node, &context), format!("/many/b{number}"));
+            let line = of_body(with, RosKind::Pose, &topic, In::AT_START);
+            lines.push(line.unwrap());
+        }
+    }
+
+    #[test]
+    fn what_fails_otherwise_is_not_tried_again_and_patience_has_an_end() {
+        let mut tries = 0;
+        let mut make = |why: &str, patience| {
+            let made: std::result::Result<(), String> = patiently(patience, || {
+                tries += 1;
+                Err(why.to_owned())
+            });
+            assert!(made.is_err());
+            std::mem::take(&mut tries)
+        };
+        assert_eq!(make("no such type", In::AT_START), 1);
+        assert!(make("sending on a full channel", In::BESIDE_TICKS) > 1);
+        assert_eq!(make("sending on a full channel", Duration::ZERO), 1);
+    }
 }

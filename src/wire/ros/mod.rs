@@ -5,6 +5,7 @@
 
 mod collisions;
 mod common;
+mod frame_name;
 mod seen;
 mod services;
 mod speak;
@@ -15,6 +16,7 @@ pub use common::{
     Clock, Duration, Header, Odometry, Point, Pose, PoseStamped, PoseWithCovariance, Quaternion,
     TfMessage, Time, Transform, TransformStamped, Twist, TwistWithCovariance, Vector3,
 };
+pub use frame_name::plain_frame;
 pub use seen::{
     ColorRgba, DiagnosticArray, DiagnosticStatus, KeyValue, Marker, MarkerArray, MeshFile, Texture,
     UvCoordinate, diagnostic_level, marker_kind,

@@ -28,7 +28,11 @@ impl Inlet {
             {
                 continue;
             }
-            let (BodyChange::Put(BodyNote { name, .. }) | BodyChange::Removed(name)) = &change;
+            if let BodyChange::Hung { name, attached } = &change {
+                hang(&mut self.sources, &self.shelf, name, *attached);
+                continue;
+            }
+            let name = change.name();
             for (at, source) in self.sources.iter_mut().enumerate() {
                 let Some(member) = source.remove_body(name) else {
                     continue;
@@ -110,6 +114,15 @@ fn keep(sources: &mut [Source], shelf: &Shelf, body: &BodyNote) -> bool {
     kept.is_some()
 }
 
+/// A body hangs on another one now, which moves it, or does no more: then it stays until its own source's next pose.
+fn hang(sources: &mut [Source], shelf: &Shelf, name: &str, attached: bool) {
+    for (at, source) in sources.iter_mut().enumerate() {
+        if let Some((member, seat)) = source.hang_body(name, attached) {
+            shelf.set_member(at, member, seat);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use ros2_client::Gid;
@@ -187,6 +200,32 @@ mod tests {
             (7, 100 * MS)
         );
         assert_eq!(sources[0].seats(), [Seat::of(&body(7))]);
+    }
+
+    #[test]
+    fn bug_poses_of_a_body_that_hangs_on_another_were_refused_without_an_end() {
+        let (mut sources, shelf) = ([source()], Shelf::default());
+        shelf.add_group(sources[0].name, 9, sources[0].seats());
+        let rows = |shelf: &Shelf| {
+            let mut inbox = Inbox::default();
+            shelf.drain(&mut inbox);
+            let rows = |frame: &crate::wire::Frame| frame.transforms.len();
+            inbox.frames().iter().map(rows).collect::<Vec<_>>()
+        };
+        send(&mut sources[0], &shelf, 100 * MS);
+        hang(&mut sources, &shelf, "a", true);
+        assert_eq!(rows(&shelf), [0; 0], "what waits is of before");
+        send(&mut sources[0], &shelf, 110 * MS);
+        assert_eq!(
+            rows(&shelf),
+            [0],
+            "its source lives, and says nothing of it"
+        );
+        assert!(sources[0].faults(9, 5000 * MS).is_empty());
+        hang(&mut sources, &shelf, "a", false);
+        assert_eq!(rows(&shelf), [0; 0]);
+        send(&mut sources[0], &shelf, 120 * MS);
+        assert_eq!(rows(&shelf), [1]);
     }
 
     #[test]

@@ -11,12 +11,17 @@ use super::super::topics::{Out, TypeName, publisher};
 use super::super::wheel::{CATCH_UP_NS, Means};
 use crate::error::Result;
 
+/// A writer that keeps more than so many words gives way to one that keeps one or two.
+const WORDS_KEPT_MAX: usize = 4;
+
 /// A writer and what it has not taken.
 pub(in super::super) struct Owed<M: Serialize> {
     writer: Publisher<M>,
     full_name: String,
     kind: TypeName,
     out: Out,
+    /// Messages that the first writer keeps.
+    depth_least: usize,
     /// What the topic says from now on; empty as soon as the writer has taken all.
     word: Vec<M>,
     /// How many of these the writer has taken.
@@ -41,6 +46,7 @@ impl<M: Serialize + Clone> Owed<M> {
             full_name: full_name.to_owned(),
             kind,
             out,
+            depth_least: out.depth,
             word: Vec::new(),
             taken: 0,
             full_ns: None,
@@ -52,8 +58,9 @@ impl<M: Serialize + Clone> Owed<M> {
     /// * returns - messages that are lost.
     pub(in super::super) fn say(&mut self, word: Vec<M>, with: &mut Means<'_>) -> u64 {
         (self.word, self.taken) = (word, 0);
-        if self.word.len() > self.out.depth {
-            let depth = self.word.len().next_power_of_two();
+        let depth = self.word.len().next_power_of_two().max(self.depth_least);
+        // Or late joiners lack a part; or they get many words of before, which nobody needs.
+        if self.word.len() > self.out.depth || self.out.depth > WORDS_KEPT_MAX * depth {
             self.turn(Out { depth, ..self.out }, with);
         }
         self.hand_over(with)

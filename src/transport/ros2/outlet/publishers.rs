@@ -11,9 +11,9 @@ use super::owed::Owed;
 use crate::error::{Error, Result};
 use crate::wire::ros;
 
-/// Messages of names kept for late joiners, at first: some hundred thousand bodies, half as many of the longest names.
-/// A scene of more has a writer that keeps more.
-const NAMES_DEPTH: usize = 64;
+/// Messages of names kept for late joiners, at first: so many revisions of a scene of some thousand bodies. One of more
+/// has a writer that keeps one or two revisions. Those who come late get what is kept, the oldest first.
+const NAMES_DEPTH: usize = 4;
 /// Bytes of a state, of a tick, and of each of its sources: a reader that has stopped may hold 16 thousand states and,
 /// of a scene with one source, 8 thousand ticks, which is 20 s at 400 Hz, and its lease has ended. So these topics keep
 /// one writer, as watchers of a node expect; only above 400 Hz, and only beside a stopped reader, does a new one go on.

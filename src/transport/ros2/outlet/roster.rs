@@ -9,6 +9,7 @@ use super::super::RosScene;
 use super::super::lines::{Arrival, Line, of_body};
 use super::super::open;
 use super::super::shared::Say;
+use super::super::topics::In;
 use super::{Outlet, Topics};
 use crate::config::RosKind;
 use crate::error::Error;
@@ -51,6 +52,14 @@ impl Unheard {
         self.of.drain(..self.of.len().min(RETRIES_MAX)).collect()
     }
 
+    /// A body that waits for its subscription hangs on another one now, or does no more.
+    fn hang(&mut self, name: &str, attached: bool) {
+        let mut waiting = self.of.iter_mut();
+        if let Some((body, _)) = waiting.find(|(body, _)| body.name == name) {
+            body.attached = attached;
+        }
+    }
+
     fn remove(&mut self, name: &str) {
         self.of.retain(|(body, _)| body.name != name);
     }
@@ -73,6 +82,10 @@ impl Outlet {
                 }
                 BodyChange::Removed(name) => {
                     self.part(name);
+                    None
+                }
+                BodyChange::Hung { name, attached } => {
+                    self.unheard.hang(name, *attached);
                     None
                 }
             };
@@ -107,7 +120,8 @@ impl Outlet {
         if let Ok(topic) = &topic {
             self.strangers.meet(topic, kind);
         }
-        let line = topic.and_then(|topic| of_body(&mut self.node, &self.context, kind, &topic));
+        let with = (&mut self.node, &self.context);
+        let line = topic.and_then(|topic| of_body(with, kind, &topic, In::BESIDE_TICKS));
         match line {
             Ok(line) => {
                 self.topics.note_heard(&body.name);
@@ -129,6 +143,7 @@ impl Outlet {
         self.unheard.remove(name);
         if let Some(topic) = self.topics.remove(name, &mut self.names) {
             self.strangers.part(&topic);
+            self.readers.misfits.part(&topic);
         }
     }
 }

@@ -45,6 +45,14 @@ pub(super) fn judge(
                 brief(frame)
             )),
         ),
+        Err(Missing::Apart(end, other)) => (
+            None,
+            Some(format!(
+                "no chain of links joins frame \"{}\" and \"{root}\": what \"{root}\" hangs on ends at \"{}\", and no link from the first one has come",
+                brief(end),
+                brief(other)
+            )),
+        ),
         Err(Missing::Loop(frame)) => (
             Some(Err(RejectReason::BadChain)),
             Some(format!(

@@ -53,6 +53,18 @@ impl Source {
         Some(place)
     }
 
+    /// A body hangs on another one now, or does no more; its place and seat, if it has one.
+    pub(in super::super) fn hang_body(
+        &mut self,
+        name: &str,
+        attached: bool,
+    ) -> Option<(usize, Seat)> {
+        let place = self.place_of(name)?;
+        let member = self.members.get_mut(place)?;
+        member.seat.attached = attached;
+        Some((place, member.seat))
+    }
+
     /// Lets a body go; the place it had, if it had one.
     pub(in super::super) fn remove_body(&mut self, name: &str) -> Option<usize> {
         let place = self.place_of(name)?;

@@ -93,6 +93,14 @@ pub(super) fn rivalry((kind, name): (&str, &str)) -> String {
     format!("{kind} {name}: two publishers send links of it: stop one of them")
 }
 
+/// Another publisher says another link of a frame that never changes: each is said once, so both may be there.
+pub(super) fn dispute((kind, name): (&str, &str)) -> String {
+    let name = brief(name);
+    format!(
+        "{kind} {name}: another publisher says another fixed link of it, and the last one counts: if both are there, stop one of them"
+    )
+}
+
 /// A stamp lies before the newest one of the same body or link: the message is passed over.
 pub(super) fn older((kind, name): (&str, &str), by_ns: u64) -> String {
     format!(

@@ -2,12 +2,13 @@
 
 #![allow(clippy::float_cmp, reason = "poses are handed on bit by bit")]
 
+mod chains;
 mod renewed;
 
 use super::*;
 use crate::config::RosSource;
 use crate::transport::{BodyNote, ros2::RosSourceSpec};
-use crate::wire::ros::{Header, Time, Transform, TransformStamped};
+use crate::wire::ros::{Header, TfMessage, Time, Transform, TransformStamped};
 
 const MS: u64 = 1_000_000;
 
@@ -374,27 +375,4 @@ fn bug_a_body_of_which_nothing_comes_any_more_was_named_nowhere() {
     message.pose.orientation = [0.0, 0.0, 0.0, 1.0].into();
     one.take_pose(0, &message, at(MS), &mut Vec::new());
     assert!(!silent(&one, 500 * MS) && silent(&one, 502 * MS));
-}
-
-#[test]
-fn bug_a_body_that_is_put_after_frames_without_end_is_not_at_the_scenes_origin() {
-    let mut one = tf("tool");
-    for n in 0..70_000 {
-        let seen = link("camera", &format!("seen_{n}"), MS);
-        one.take_links(&seen, false, at(MS));
-    }
-    let late = BodyNote {
-        id: 2,
-        name: "late".to_owned(),
-        source: Some(0),
-        frame: "late".to_owned(),
-        ..BodyNote::default()
-    };
-    one.put_body(&late);
-    assert!(look(&mut one, 2 * MS).is_empty(), "nobody has said where");
-    let told = one.faults(9, 2 * MS);
-    assert!(told[1].contains("no link from frame \"late\""), "{told:?}");
-    one.take_links(&link("world", "late", 3 * MS), false, at(3 * MS));
-    let said = look(&mut one, 3 * MS);
-    assert_eq!(said[0].result.unwrap().position, [1.0, 0.0, 0.0]);
 }

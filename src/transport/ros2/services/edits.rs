@@ -9,7 +9,10 @@ use crate::wire::ros::{AttachBody, Pose, PutBody, SetFilter, SolidPrimitive};
 pub(super) fn in_words(edit: &Value) -> String {
     let entry = edit.as_object().and_then(|edit| edit.iter().next());
     let verb = entry.map_or("", |(verb, _)| verb.as_str());
-    let body = entry.and_then(|(_, what)| what.get("name"));
+    let body = entry.and_then(|(_, what)| match what {
+        Value::String(_) => Some(what),
+        _ => what.get("name").or_else(|| what.get("body")),
+    });
     let body = body.map_or_else(|| edit.to_string(), ToString::to_string);
     format!("edit over ROS 2: {verb} {}", brief(&body))
 }
@@ -174,6 +177,17 @@ mod tests {
             ..request
         };
         assert!(put(&prism).unwrap_err().contains("prisms"));
+    }
+
+    #[test]
+    fn bug_the_log_of_an_edit_held_all_its_words_instead_of_its_body() {
+        let words = |edit| in_words(&edit).replace("edit over ROS 2: ", "");
+        let attach = json!({ "attach": { "body": "lid", "to": "box" } });
+        assert_eq!(words(attach), "attach \"lid\"");
+        assert_eq!(words(json!({ "remove": "lid" })), "remove \"lid\"");
+        assert_eq!(words(json!({ "put": { "name": "lid" } })), "put \"lid\"");
+        let reset = json!({ "reset": {} });
+        assert_eq!(words(reset), "reset {\"reset\":{}}");
     }
 
     #[test]

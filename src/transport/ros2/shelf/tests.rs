@@ -7,7 +7,7 @@ use crate::wire::name_bytes;
 fn seats(ids: &[u64]) -> Vec<Seat> {
     let seat = |&body| Seat {
         body,
-        continuous: false,
+        ..Seat::default()
     };
     ids.iter().map(seat).collect()
 }

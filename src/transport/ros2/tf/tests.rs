@@ -185,3 +185,102 @@ fn bug_a_frame_whose_name_is_too_long_is_refused_and_not_kept() {
     );
     assert_eq!((taken, tree.ids.len()), (Taken::Newer, 2));
 }
+
+/// A tree whose scene is in `odom`, which hangs on `map`.
+fn odom() -> (Tree, usize) {
+    let (mut tree, root) = Tree::rooted("odom");
+    tree.take(&link("map", "odom", 1.0, 100), false, 7, BACK_NS);
+    (tree, root)
+}
+
+#[test]
+fn bug_a_body_beside_the_scenes_frame_had_no_pose_though_a_frame_above_both_joins_them() {
+    let (mut tree, root) = odom();
+    tree.take(&link("map", "obstacle", 3.0, 140), false, 9, BACK_NS);
+    let obstacle = tree.pin("obstacle");
+    let found = tree.find(obstacle, root).unwrap();
+    // Two metres ahead in `map` are on the right in `odom`, which is turned by a quarter; both are turned alike.
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+    let [x, y, z] = found.position;
+    assert!(near(x, 0.0) && near(y, -2.0) && near(z, 0.0), "{found:?}");
+    assert!(near(found.orientation[3].abs(), 1.0), "{found:?}");
+    assert_eq!((found.stamp_ns, found.skew_ns), (100, 40));
+    assert_eq!(found.received_ns, Some((9, 7)));
+    // The frame above is itself a body's.
+    let map = tree.pin("map");
+    let [x, y, _] = tree.find(map, root).unwrap().position;
+    assert!(near(x, 0.0) && near(y, 1.0), "{x} {y}");
+    // What hangs on the scene's frame needs nothing above it.
+    tree.take(&link("odom", "base", 5.0, 5), false, 3, BACK_NS);
+    let base = tree.pin("base");
+    let found = tree.find(base, root).unwrap();
+    assert_eq!((found.position, found.stamp_ns), ([5.0, 0.0, 0.0], 5));
+}
+
+#[test]
+fn chains_that_do_not_meet_are_told_with_both_ends() {
+    let (mut tree, root) = odom();
+    tree.take(&link("base", "tool", 1.0, 1), false, 1, BACK_NS);
+    let tool = tree.pin("tool");
+    let apart = Missing::Apart("base".to_owned(), "map".to_owned());
+    assert_eq!(tree.find(tool, root), Err(apart));
+    // A loop above the scene's frame joins nothing, and a link that is no pose is no refusal where it is not needed.
+    tree.take(&link("odom", "map", 1.0, 1), false, 1, BACK_NS);
+    assert!(matches!(
+        tree.find(tool, root),
+        Err(Missing::Apart(..) | Missing::Frame(_))
+    ));
+    let mut zero = link("earth", "map", 1.0, 1);
+    zero.transform.rotation = [0.0; 4].into();
+    tree.take(&zero, false, 1, BACK_NS);
+    assert!(matches!(tree.find(tool, root), Err(Missing::Apart(..))));
+    tree.take(&link("earth", "base", 1.0, 1), false, 1, BACK_NS);
+    let bad = Missing::Bad("map".to_owned(), RejectReason::BadQuaternion);
+    assert_eq!(tree.find(tool, root), Err(bad));
+}
+
+/// Three stamps of a clock that began anew; what the last of them makes of it.
+fn restart(tree: &mut Tree, parent: &str, child: &str) -> Taken {
+    tree.take(&link(parent, child, 1.0, 2000), false, 1, BACK_NS);
+    let late = [0, 150, 300].map(|n| {
+        let link = link(parent, child, 2.0, 100 + n);
+        tree.take(&link, false, 3 + n, BACK_NS)
+    });
+    assert!(matches!(late[..2], [Taken::Older(_), Taken::Older(_)]));
+    late[2]
+}
+
+#[test]
+fn bug_a_link_that_no_body_hangs_on_began_the_whole_source_anew() {
+    let (mut tree, root) = odom();
+    tree.take(&link("odom", "base", 1.0, 2000), false, 1, BACK_NS);
+    let base = tree.pin("base");
+    for (parent, child) in [("camera", "tag"), ("base", "camera"), ("map", "odom")] {
+        assert_eq!(restart(&mut tree, parent, child), Taken::Newer, "{child}");
+        let on = link(parent, child, 3.0, 450);
+        assert_eq!(tree.take(&on, false, 400, BACK_NS), Taken::Newer);
+    }
+    assert!(tree.find(base, root).is_ok());
+    // Now a body hangs on each of these two, and one beside the scene's frame on what is above that.
+    tree.pin("tag");
+    assert_eq!(restart(&mut tree, "camera", "tag"), Taken::WentBack);
+    assert!(tree.find(base, root).is_err());
+    assert_eq!(restart(&mut tree, "map", "odom"), Taken::WentBack);
+}
+
+#[test]
+fn bug_a_stamp_of_0_in_a_chain_made_its_stamps_lie_56_years_apart() {
+    let mut tree = Tree::default();
+    tree.take(&link("world", "base", 1.0, 0), false, 7, BACK_NS);
+    let found = find(&mut tree, "base").unwrap();
+    assert_eq!((found.stamp_ns, found.skew_ns), (0, 0));
+    assert_eq!(
+        found.received_ns,
+        Some((7, 7)),
+        "it has an age all the same"
+    );
+    tree.take(&link("base", "tool", 2.0, 1 << 60), false, 9, BACK_NS);
+    let found = find(&mut tree, "tool").unwrap();
+    assert_eq!((found.stamp_ns, found.skew_ns), (1 << 60, 0));
+    assert_eq!(found.received_ns, Some((9, 7)));
+}

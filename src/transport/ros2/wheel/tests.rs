@@ -31,7 +31,7 @@ pub(in super::super) const SMALL: Out = Out {
 
 /// A domain that no other process of these tests is in, nor another of `place`.
 pub(in super::super) fn domain(place: u16) -> u16 {
-    101 + u16::try_from(std::process::id() % 21).unwrap() * 6 + place
+    101 + u16::try_from(std::process::id() % 16).unwrap() * 8 + place
 }
 
 pub(in super::super) fn peer(domain: u16, name: &str) -> (Context, Node) {
@@ -57,6 +57,7 @@ pub(in super::super) fn reader(
         reliable: true,
         latched,
         depth: 100,
+        patience: In::AT_START,
     };
     subscription(node, context, TOPIC, quality).unwrap()
 }

@@ -136,4 +136,8 @@ fn bug_who_comes_late_gets_all_of_a_long_word() {
         hear(&from, &mut heard);
     }
     assert!(heard.ends_with(&(2..=76).collect::<Vec<_>>()), "{heard:?}");
+    assert_eq!(rig.owed.out.depth, 128);
+    // A writer for long words would keep dozens of short ones, and who comes late would get them all.
+    rig.say(1);
+    assert_eq!(rig.owed.out.depth, 4);
 }
