@@ -10,11 +10,14 @@
 //! rate every tick takes the newest state. Of a source that moves continuous bodies all frames are taken, in each mode.
 
 mod beat;
+mod bent;
+mod fold;
 mod held;
 mod source;
 
 use beat::Beat;
-use held::{Ahead, Held, Queue, Vertices, Whose};
+use bent::{Ahead, Vertices};
+use held::{Held, Queue, Turn, Whose};
 use source::{Source, Speaker};
 
 use crate::config::Config;
@@ -138,8 +141,12 @@ impl Pacer {
                 since_ns.get_or_insert(received_ns);
             }
             let leads = |at| matches!(self.beat, Beat::OnFrame(lead) if at == lead);
-            let alone = place.is_some_and(|at| leads(at) || world.is_followed(at));
-            let passed = self.queue.put(frame, whose, alone);
+            let turn = match place {
+                Some(at) if leads(at) => Turn::Each,
+                Some(at) if world.is_followed(at) => Turn::Way,
+                _ => Turn::Newest,
+            };
+            let passed = self.queue.put(frame, whose, turn);
             let source = place.and_then(|p| self.sources.get_mut(p));
             *source.map_or(&mut self.passed_of_none, |source| &mut source.passed) += passed;
         }
