@@ -8,6 +8,8 @@
 
 #[path = "law_pace/many.rs"]
 mod many;
+#[path = "law_pace/rounds.rs"]
+mod rounds;
 #[path = "law_world/support.rs"]
 mod support;
 

@@ -84,6 +84,25 @@ fn law_4_5_the_time_that_a_frame_has_left_counts_from_its_receipt() {
 }
 
 #[test]
+fn law_4_5_bug_a_tick_of_the_leading_source_was_cut_short_for_the_frame_of_another() {
+    for (lead, is_short) in [(None, true), (Some(0), true), (Some(1), false)] {
+        let mut rig = pairs();
+        // It was over long before the lead sent.
+        (rig.deadline_ns, rig.lead) = (1, lead);
+        let row = collide(&mut rig, ALL);
+        let budget_ns = if is_short { 0 } else { u64::MAX };
+        assert_eq!(
+            (row.budget_ns, row.overrun),
+            (budget_ns, u8::from(is_short))
+        );
+        assert_eq!(row.possible == PAIRS, is_short);
+        // Nor is it for the next tick.
+        rig.deadline_ns = 0;
+        assert_eq!(collide(&mut rig, ALL).budget_ns, u64::MAX);
+    }
+}
+
+#[test]
 fn law_4_5_a_frames_deadline_never_lengthens_the_budget() {
     let budget = Budget::time_ns(SHORT_NS);
     let plain = collide(&mut pairs(), budget);
@@ -91,7 +110,6 @@ fn law_4_5_a_frames_deadline_never_lengthens_the_budget() {
     assert!(plain.possible > 100);
     let mut rig = pairs();
     rig.deadline_ns = after(&rig, LONG_NS);
-    rig.time_left_ns = LONG_NS;
     let row = collide(&mut rig, budget);
     assert_eq!(
         (row.budget_ns, row.units, row.elapsed_ns),
