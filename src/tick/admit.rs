@@ -94,10 +94,10 @@ impl Engine {
         self.world.age(now_ns);
         // Of each source the newest: the result of the others is told to nobody. A tick that is one source's is not cut
         // short for others, whose frames waited for it for as long as that one liked.
-        let end = &mut self.end;
+        let (end, clock) = (&mut self.end, self.clock.as_ref());
         self.world.tell_admitted(|source, header, received_ns| {
             if lead.is_none_or(|lead| lead == source.index()) {
-                end.shorten(header, received_ns, now_ns);
+                end.shorten(header, (received_ns, now_ns), clock);
             }
         });
     }
