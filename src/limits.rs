@@ -61,10 +61,11 @@ pub const VERTEX_FRAMES_WAITING_MAX: usize = 1024;
 /// Vertices of one source that wait for their tick, in all of its messages: as many as its queue in shared memory
 /// holds.
 pub const VERTEX_ROWS_WAITING_MAX: usize = 64 * DEFORMING_VERTICES_MAX;
-/// Frames of one source that wait for a scene revision; beyond it, and beyond `FRAME_ROWS_MAX` of all of them, the
-/// oldest go.
+/// Frames of one source that wait for a scene revision, and as many that wait for their tick, where each makes one or is
+/// a part of a body's way; beyond it, and beyond `FRAME_ROWS_MAX` of all of them, the oldest go.
 pub const FRAMES_WAITING_MAX: usize = 1024;
-/// Frames taken from one source in one drain; the rest waits in its queue, newest kept.
+/// Frames of one source that wait whatever their size is. Where they are parts of nothing, those beyond it are folded
+/// into one, or the oldest go; so they do of one that is to be refused, and of those that wait for the ROS 2 node.
 pub const FRAMES_PER_DRAIN_MAX: usize = 64;
 /// Largest coordinate of a pose, metres: beyond it f64 has a spacing of 0.1 mm and no contact means anything.
 pub const COORDINATE_MAX_M: f64 = 1e12;
@@ -160,6 +161,7 @@ const _: () = {
     assert!(PAIRS_DEFAULT < u32::MAX as usize);
     assert!(CONTACTS_PER_PAIR_MAX >= MANIFOLD_POINTS_MAX);
     assert!(SOURCES_MAX <= 255);
+    assert!(FRAMES_PER_DRAIN_MAX < FRAMES_WAITING_MAX);
     assert!(ROS_REPLY_TEXT_BYTES_MAX < ROS_REPLY_BYTES_MAX / 2);
     assert!(RAY_MAX_M > 3.5 * (COORDINATE_MAX_M + EXTENT_MAX_M));
 };

@@ -6,10 +6,12 @@
     reason = "helpers of tests are not covered by the test allowance; milliseconds here are whole numbers"
 )]
 
+#[path = "law_pace/many.rs"]
+mod many;
+#[path = "law_pace/rounds.rs"]
+mod rounds;
 #[path = "law_world/support.rs"]
 mod support;
-
-use std::sync::Arc;
 
 use sweepd::config::{Config, Mode};
 use sweepd::ids::SourceSlot;
@@ -17,7 +19,7 @@ use sweepd::scene::Scene;
 use sweepd::tick::pace::{Due, Pacer};
 use sweepd::time::{Clock, ManualClock};
 use sweepd::wire::{BodyStatus, Frame, Inbox, TickCause, WIRE_VERSION, frame_flags};
-use sweepd::world::{Edit, Put, World};
+use sweepd::world::{Edit, World};
 
 use support::{MS, START_NS, TIMEOUT_NS, cube, fixed, frame, moving, row, scene};
 
@@ -49,6 +51,11 @@ struct Daemon {
     passed: Vec<(Option<SourceSlot>, u64)>,
 }
 
+/// A mode with one tick for each frame of `sim`.
+fn on_sim() -> Mode {
+    Mode::OnFrame("sim".to_owned())
+}
+
 fn two_bodies(mode: Mode) -> Scene {
     let mut robot = moving("b", 2);
     robot.source = Some(1);
@@ -67,7 +74,10 @@ fn two_bodies(mode: Mode) -> Scene {
 
 impl Daemon {
     fn of(mode: Mode) -> Self {
-        let scene = two_bodies(mode);
+        Self::of_scene(two_bodies(mode))
+    }
+
+    fn of_scene(scene: Scene) -> Self {
         let shapes = scene.bodies.iter().map(|_| cube()).collect();
         Self {
             pacer: Pacer::new(&scene.config, &scene.sources).unwrap(),
@@ -167,12 +177,7 @@ fn ns(ms: f64) -> u64 {
 }
 
 fn modes() -> [Mode; 4] {
-    [
-        Mode::OnFrame("sim".to_owned()),
-        Mode::OnAll,
-        Mode::Rate(500.0),
-        Mode::Rate(2.0),
-    ]
+    [on_sim(), Mode::OnAll, Mode::Rate(500.0), Mode::Rate(2.0)]
 }
 
 fn sim(seq: u64) -> Frame {
@@ -272,7 +277,7 @@ fn law_4_4_silence_of_a_suspended_machine_is_never_clear() {
 
 #[test]
 fn law_4_4_on_frame_makes_one_tick_of_each_frame_in_order() {
-    let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
+    let mut daemon = Daemon::of(on_sim());
     // Five frames at once, and a robot that is ten times as fast.
     let mut frames: Vec<_> = (1..=5).map(|seq| (20.0, sim(seq))).collect();
     frames.extend(stream(robot, 100, 0.5, 1.0));
@@ -315,7 +320,7 @@ fn law_4_4_a_paused_frame_counts_as_a_frame_in_every_mode() {
         frames.extend((2..=12).map(|seq| (100.0 * seq as f64, robot(seq))));
         let ticks = daemon.run(1250.0, frames);
         assert!(ticks.last().is_some_and(|t| t.known == 3), "{mode:?}");
-        if mode == Mode::OnFrame("sim".to_owned()) {
+        if mode == on_sim() {
             let by_frame = ticks.iter().filter(|t| t.due.cause == TickCause::Frame);
             assert_eq!(by_frame.count(), 12);
         }
@@ -379,34 +384,6 @@ fn law_4_4_a_round_takes_the_newest_frame_of_each_live_source() {
     assert_eq!(ticks[2].at_ms, 12.0);
     assert!(taken(&ticks[2], "sim", 3) && taken(&ticks[2], "robot", 2));
     assert_eq!(daemon.passed_of(0), 1);
-}
-
-#[test]
-fn law_1_no_frame_of_a_source_that_moves_a_continuous_body_is_passed_over() {
-    for mode in modes() {
-        let mut daemon = Daemon::of(mode.clone());
-        // A body that is put while the daemon runs; the robot, which leads no tick, is its source.
-        let mut bullet = moving("bullet", 4);
-        (bullet.source, bullet.continuous) = (Some(1), true);
-        daemon.edits.push(Edit::Put(Put {
-            body: Arc::new(bullet),
-            shapes: cube(),
-        }));
-        daemon.run(3.0, Vec::new());
-        for source in 0..2 {
-            assert_eq!(daemon.world.is_followed(source), source == 1);
-        }
-        let frames = (1..=40).map(|seq| (4.0 + 0.25 * seq as f64, robot(seq)));
-        let frames = frames.chain([(15.0, sim(1))]).collect();
-        let ticks = daemon.run(200.0, frames);
-        let of_robot = |t: &Tick| {
-            let frames = t.frames.iter().filter(|(name, _)| name == "robot");
-            frames.map(|(_, seq)| *seq).collect::<Vec<u64>>()
-        };
-        let taken: Vec<u64> = ticks.iter().flat_map(of_robot).collect();
-        assert_eq!(taken, (1..=40).collect::<Vec<u64>>(), "{mode:?}");
-        assert_eq!(daemon.passed_of(1), 0, "{mode:?}");
-    }
 }
 
 #[test]
@@ -541,7 +518,7 @@ fn law_4_4_an_edit_makes_a_tick_at_once_in_every_mode() {
 
 #[test]
 fn law_4_2_a_session_that_was_heard_in_time_is_not_taken_over_by_a_frame_that_waited_behind_it() {
-    let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
+    let mut daemon = Daemon::of(on_sim());
     let mut other = robot(1);
     other.header.session = 77;
     // The robot sends all the time; an intruder asks once; no tick for 700 ms takes either.
@@ -560,7 +537,7 @@ fn law_4_2_a_session_that_was_heard_in_time_is_not_taken_over_by_a_frame_that_wa
 
 #[test]
 fn law_4_2_an_ended_session_ends_after_the_last_of_its_frames() {
-    let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
+    let mut daemon = Daemon::of(on_sim());
     *daemon.drained.push() = robot(1);
     daemon.drained.end_session(1);
     let now_ns = daemon.clock.boottime_ns();
@@ -602,7 +579,7 @@ fn next(daemon: &mut Daemon) -> Option<Taken> {
 
 #[test]
 fn law_4_4_vertices_wait_for_the_frame_that_they_belong_with() {
-    let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
+    let mut daemon = Daemon::of(on_sim());
     bend(&mut daemon, "sim", 1, 1, 1);
     bend(&mut daemon, "robot", 1, 5, 50);
     bend(&mut daemon, "sim", 1, 0, 2);
@@ -698,7 +675,7 @@ fn law_4_4_bug_vertices_of_a_round_that_is_under_way_went_ahead_of_their_frame()
 
 #[test]
 fn law_4_2_bug_vertices_of_another_session_wait_for_the_frames_of_the_one_in_force() {
-    let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
+    let mut daemon = Daemon::of(on_sim());
     daemon.run(5.0, vec![(1.0, robot(1)), (2.0, sim(1))]);
     // The robot's frames wait for the lead; another one's vertices would be taken with any tick.
     for seq in 2..=4 {
@@ -765,7 +742,7 @@ fn law_4_2_bug_what_is_of_another_boot_begins_no_round() {
 
 #[test]
 fn law_4_4_bug_vertices_go_with_their_frame_whoever_else_sends() {
-    let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
+    let mut daemon = Daemon::of(on_sim());
     daemon.run(1.0, Vec::new());
     let mut foreign = sim(1);
     foreign.header.session = 77;
@@ -797,7 +774,7 @@ fn law_4_4_bug_vertices_go_with_their_frame_whoever_else_sends() {
 
 #[test]
 fn law_4_2_bug_a_stranger_that_floods_pushes_no_frame_of_the_lead_out() {
-    let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
+    let mut daemon = Daemon::of(on_sim());
     daemon.run(1.0, vec![(0.0, sim(1))]);
     *daemon.drained.push() = sim(2);
     for seq in 1..=70 {

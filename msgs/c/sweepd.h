@@ -69,7 +69,7 @@ enum {
     SWEEPD_REASON_REMOVED_BY_AGE = 3,
     /* A body's newest pose or vertices were refused. */
     SWEEPD_REASON_REJECTED = 4,
-    /* Rows or pairs did not fit. */
+    /* Rows, pairs or frames of a path did not fit. */
     SWEEPD_REASON_TRUNCATED = 5,
     /* Work was not finished. */
     SWEEPD_REASON_UNDECIDED = 6,

@@ -190,6 +190,9 @@ impl<'a> Daemon<'a> {
     fn receive(&mut self) -> Result<()> {
         self.door.receive(&mut self.arrived, self.clock.as_ref());
         let now_ns = self.clock.boottime_ns();
+        let ahead_ns = now_ns.saturating_sub(self.clock.monotonic_ns());
+        self.pacer
+            .know(self.engine.outbox().tick.floor_ns, ahead_ns);
         self.pacer
             .take(&mut self.arrived, self.engine.world(), now_ns);
         let builder = &mut self.builder;

@@ -203,7 +203,9 @@ fn put_inbox(inbox: &Inbox, to: &mut Vec<u8>) {
     for frame in inbox.frames() {
         frame.header.put(to);
         frame.received_ns.put(to);
-        [u8::from(frame.waited), reason_code(frame.refused), 0, 0].put(to);
+        let cut = u8::from(frame.cut);
+        [u8::from(frame.waited), reason_code(frame.refused), cut, 0].put(to);
+        frame.first_seq.put(to);
         put_rows(&frame.transforms, to);
         put_rows(&frame.velocities, to);
         put_rows(&frame.stamps_ns, to);
@@ -232,7 +234,7 @@ fn take_inbox(from: &mut Take<'_>, inbox: &mut Inbox) -> Taken<()> {
         let frame: &mut VertexFrame = inbox.push_vertices();
         frame.header = Field::take(from)?;
         frame.received_ns = Field::take(from)?;
-        (frame.waited, frame.refused) = take_marks(from)?;
+        (frame.waited, frame.refused, _) = take_marks(from)?;
         take_rows(from, &mut frame.rows)?;
     }
     let mut ended = Vec::new();
@@ -246,7 +248,8 @@ fn take_inbox(from: &mut Take<'_>, inbox: &mut Inbox) -> Taken<()> {
 fn take_frame(from: &mut Take<'_>, frame: &mut Frame) -> Taken<()> {
     frame.header = Field::take(from)?;
     frame.received_ns = Field::take(from)?;
-    (frame.waited, frame.refused) = take_marks(from)?;
+    (frame.waited, frame.refused, frame.cut) = take_marks(from)?;
+    frame.first_seq = Field::take(from)?;
     take_rows(from, &mut frame.transforms)?;
     take_rows(from, &mut frame.velocities)?;
     take_rows(from, &mut frame.stamps_ns)?;
@@ -263,13 +266,13 @@ fn reason_code(reason: Option<RejectReason>) -> u8 {
     reason.map_or(NONE, RejectReason::code)
 }
 
-fn take_marks(from: &mut Take<'_>) -> Taken<(bool, Option<RejectReason>)> {
-    let [waited, reason, ..] = <[u8; 4]>::take(from)?;
+fn take_marks(from: &mut Take<'_>) -> Taken<(bool, Option<RejectReason>, bool)> {
+    let [waited, reason, cut, _] = <[u8; 4]>::take(from)?;
     let refused = match reason {
         NONE => None,
         code => Some(RejectReason::from_code(code).ok_or(Damaged)?),
     };
-    Ok((waited != 0, refused))
+    Ok((waited != 0, refused, cut != 0))
 }
 
 #[cfg(test)]

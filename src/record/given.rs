@@ -13,7 +13,7 @@ use crate::wire::{Demand, Inbox, Outbox, TickCause, WIRE_VERSION};
 use crate::world::{Applied, TreeOf};
 
 /// Number of the layout of our messages in a recording; another is not read. 2: `number` in `VertexHeader`;
-/// 3: `since_ns` of frames.
+/// 3: `since_ns`, `first_seq` and `cut` of frames.
 pub const LAYOUT: u32 = 3;
 
 /// How a daemon began.
@@ -297,6 +297,7 @@ fn copy_inbox(from: &Inbox, to: &mut Inbox) {
         copy.received_ns = frame.received_ns;
         copy.waited = frame.waited;
         copy.refused = frame.refused;
+        (copy.first_seq, copy.cut) = (frame.first_seq, frame.cut);
         copy.transforms.extend_from_slice(&frame.transforms);
         copy.velocities.extend_from_slice(&frame.velocities);
         copy.stamps_ns.extend_from_slice(&frame.stamps_ns);

@@ -4,8 +4,9 @@
 
 use std::sync::Arc;
 
+use super::beat::beat;
 use super::floor::Laps;
-use super::{EditOutcome, Engine, TickInput, beat};
+use super::{EditOutcome, Engine, TickInput};
 use crate::plan::Seen;
 use crate::time::Meter;
 use crate::wire::{Frame, Inbox, SOURCE_NAME_LEN, TickCause};
@@ -17,7 +18,7 @@ impl Engine {
         let fault = asked.then(|| self.repair()).flatten();
         self.world.begin_tick(self.tick, now_ns);
         self.edit(input, laps, fault.as_deref());
-        self.admit_frames(input.inbox, now_ns);
+        self.admit_frames(input.inbox, now_ns, input.cause_source);
         let limited = self.config.budget.is_limited();
         // Who has no time because only ages are judged says nothing of what the others will have.
         let ages_only = input.budget.units == Some(0) && input.cause != TickCause::Frame;
@@ -42,9 +43,9 @@ impl Engine {
         let row = self.bare_tick(input);
         let clock = Arc::clone(&self.clock);
         let mut beat = beat(&mut input.pulse, row, clock.as_ref());
-        let heartbeat_ns = self.config.heartbeat_ns;
+        let (from_ns, heartbeat_ns) = (self.beats_from(laps.woke_ns()), self.config.heartbeat_ns);
         let mut meter =
-            Meter::unlimited(clock.as_ref()).with_beat(laps.woke_ns(), heartbeat_ns, &mut beat);
+            Meter::unlimited(clock.as_ref()).with_beat(from_ns, heartbeat_ns, &mut beat);
         for batch in input.edits {
             let (token, mut warnings) = (batch.token, batch.warnings.clone());
             if batch.validate {
@@ -70,7 +71,8 @@ impl Engine {
         }
     }
 
-    fn admit_frames(&mut self, inbox: &Inbox, now_ns: u64) {
+    /// * `lead` - place of the source whose tick it is; `None`: it is everybody's.
+    fn admit_frames(&mut self, inbox: &Inbox, now_ns: u64, lead: Option<usize>) {
         let frames = inbox.frames();
         for (at, frame) in frames.iter().enumerate() {
             self.end_before(
@@ -91,10 +93,14 @@ impl Engine {
             self.world.end_session(session);
         }
         self.world.age(now_ns);
-        // Of each source the newest: the result of the others is told to nobody.
-        let end = &mut self.end;
-        self.world
-            .tell_admitted(|header, received_ns| end.shorten(header, received_ns, now_ns));
+        // Of each source the newest: the result of the others is told to nobody. A tick that is one source's is not cut
+        // short for others, whose frames waited for it for as long as that one liked.
+        let (end, clock) = (&mut self.end, self.clock.as_ref());
+        self.world.tell_admitted(|source, header, received_ns| {
+            if lead.is_none_or(|lead| lead == source.index()) {
+                end.shorten(header, (received_ns, now_ns), clock);
+            }
+        });
     }
 
     /// Ends the session in force of a source before another one speaks for it, where its client is gone: what it has

@@ -1,7 +1,7 @@
 //! When a tick is to end: its budget of time, shortened by the deadlines that its frames carry.
 
 use crate::narrow::Order;
-use crate::time::Budget;
+use crate::time::{Budget, Clock};
 use crate::wire::FrameHeader;
 
 /// The time of a tick, nanoseconds of `CLOCK_MONOTONIC`.
@@ -22,16 +22,28 @@ impl End {
     /// Shortens it by what a frame says, where it says so; never lengthens it. For frames that were admitted only: who
     /// is refused has no say in how long others' answers may take.
     ///
-    /// * `received_ns` - when it was received, `CLOCK_BOOTTIME`; 0: now. The time that it has left counts from there.
+    /// * `received_ns` - when it was received, `CLOCK_BOOTTIME`; 0: at `now_ns`. The time that it has left counts from
+    ///   there, not from the wake-up: what the tick takes before it begins would be charged twice.
     /// * `now_ns` - `CLOCK_BOOTTIME`.
-    pub(super) fn shorten(&mut self, header: &FrameHeader, received_ns: u64, now_ns: u64) {
-        let waited_ns = match received_ns {
-            0 => 0,
-            received_ns => now_ns.saturating_sub(received_ns),
-        };
-        let left_ns = self.woke_ns.saturating_add(header.time_left_ns);
+    pub(super) fn shorten(
+        &mut self,
+        header: &FrameHeader,
+        (received_ns, now_ns): (u64, u64),
+        clock: &dyn Clock,
+    ) {
         let own = (header.deadline_ns != 0).then_some(header.deadline_ns);
-        let left = (header.time_left_ns != 0).then(|| left_ns.saturating_sub(waited_ns));
+        let left = (header.time_left_ns != 0).then(|| {
+            let received_ns = if received_ns == 0 {
+                now_ns
+            } else {
+                received_ns
+            };
+            // The receipt on `CLOCK_MONOTONIC`.
+            let read_ns = clock.monotonic_ns();
+            let ago_ns = clock.boottime_ns().saturating_sub(received_ns);
+            let end_ns = read_ns.saturating_add(header.time_left_ns);
+            end_ns.saturating_sub(ago_ns)
+        });
         let earliest = [self.end_ns, own, left].into_iter().flatten().min();
         self.end_ns = earliest;
     }

@@ -10,11 +10,15 @@
 //! rate every tick takes the newest state. Of a source that moves continuous bodies all frames are taken, in each mode.
 
 mod beat;
+mod bent;
+mod fold;
 mod held;
+mod round;
 mod source;
 
 use beat::Beat;
-use held::{Ahead, Held, Queue, Vertices, Whose};
+use bent::{Ahead, Vertices};
+use held::{Held, Queue, Turn, Whose};
 use source::{Source, Speaker};
 
 use crate::config::Config;
@@ -47,6 +51,9 @@ pub struct Pacer {
     ended: Vec<u64>,
     passed_of_none: u64,
     last_tick_ns: Option<u64>,
+    /// See [`Pacer::know`].
+    floor_ns: u64,
+    boot_ahead_ns: u64,
 }
 
 impl Pacer {
@@ -66,6 +73,8 @@ impl Pacer {
             ended: Vec::new(),
             passed_of_none: 0,
             last_tick_ns: None,
+            floor_ns: 0,
+            boot_ahead_ns: 0,
         })
     }
 
@@ -138,8 +147,12 @@ impl Pacer {
                 since_ns.get_or_insert(received_ns);
             }
             let leads = |at| matches!(self.beat, Beat::OnFrame(lead) if at == lead);
-            let alone = place.is_some_and(|at| leads(at) || world.is_followed(at));
-            let passed = self.queue.put(frame, whose, alone);
+            let turn = match place {
+                Some(at) if leads(at) => Turn::Each,
+                Some(at) if world.is_followed(at) => Turn::Way,
+                _ => Turn::Newest,
+            };
+            let passed = self.queue.put(frame, whose, turn);
             let source = place.and_then(|p| self.sources.get_mut(p));
             *source.map_or(&mut self.passed_of_none, |source| &mut source.passed) += passed;
         }
@@ -297,34 +310,6 @@ impl Pacer {
     fn has_frame_of(&self, source: usize) -> bool {
         let mut frames = self.queue.frames().iter();
         frames.any(|held| held.whose.source == Some(source) && held.whose.speaks)
-    }
-
-    /// When the round under way ends: now, if every source that is waited for has sent; else when it is late.
-    fn round_ends_ns(&self, now_ns: u64) -> Option<u64> {
-        let Beat::OnAll {
-            since_ns: Some(since_ns),
-            late_ns,
-        } = self.beat
-        else {
-            return None;
-        };
-        let missing = self
-            .sources
-            .iter()
-            .any(|s| s.is_waited_for(now_ns) && !s.sent);
-        let late_ns = since_ns.saturating_add(late_ns);
-        Some(if missing { late_ns } else { now_ns })
-    }
-
-    fn close_round(&mut self, now_ns: u64, late_ns: u64) {
-        for source in &mut self.sources {
-            source.late |= source.is_waited_for(now_ns) && !source.sent;
-            source.sent = false;
-        }
-        self.beat = Beat::OnAll {
-            since_ns: None,
-            late_ns,
-        };
     }
 
     /// Sessions that ended go out with, or after, the last of their frames.

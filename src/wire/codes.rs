@@ -80,7 +80,7 @@ code! {
         RemovedByAge = 3 => "removed_by_age",
         /// A body's newest pose or vertices were refused.
         Rejected = 4 => "rejected",
-        /// Rows or pairs did not fit.
+        /// Rows, pairs or frames of a path did not fit.
         Truncated = 5 => "truncated",
         /// Work was not finished.
         Undecided = 6 => "undecided",

@@ -26,9 +26,22 @@ pub struct Frame {
     pub waited: bool,
     /// Why the transport left its rows behind (too many to copy); the frame is refused as a whole.
     pub refused: Option<RejectReason>,
+    /// Least number of the frames that it stands for: the pauses before it, none of which was lost; 0: its own.
+    pub first_seq: u64,
+    /// Frames of its session before it were dropped here, for too many waited: a part of the way to its poses is gone.
+    pub cut: bool,
 }
 
 impl Frame {
+    /// Least number of the frames that it stands for.
+    #[must_use]
+    pub fn stands_from(&self) -> u64 {
+        match self.first_seq {
+            0 => self.header.seq,
+            first => first.min(self.header.seq),
+        }
+    }
+
     /// Takes poses without velocities.
     pub fn set_transforms(&mut self, rows: &[TransformRow]) {
         self.transforms.clear();
@@ -71,6 +84,7 @@ impl Inbox {
         frame.received_ns = 0;
         frame.waited = false;
         frame.refused = None;
+        (frame.first_seq, frame.cut) = (0, false);
         frame.transforms.clear();
         frame.velocities.clear();
         frame.stamps_ns.clear();

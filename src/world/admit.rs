@@ -132,10 +132,14 @@ impl World {
         let header = &frame.header;
         let times = self.times_of(frame);
         let state = &mut self.sources[source.index()];
-        let standing = stand(state, source, &mut self.over, header, times.received_ns);
+        let numbers = (header, frame.stands_from());
+        let standing = stand(state, source, &mut self.over, numbers, times.received_ns);
         match standing {
             Standing::Refused(reason) => return Err(reason),
-            Standing::Afresh => self.forget_poses(source),
+            Standing::Afresh => {
+                state.cuts_next = false;
+                self.forget_poses(source);
+            }
             Standing::Next => {}
         }
         let state = &mut self.sources[source.index()];
@@ -199,7 +203,9 @@ impl World {
             state.since_ns = times.since_ns;
             state.alive = self.now_ns.saturating_sub(times.since_ns) < state.timeout_ns;
         }
+        let cut = std::mem::take(&mut state.cuts_next) || frame.cut;
         if frame.header.flags == frame_flags::PAUSED {
+            state.cuts_next = cut;
             // The poses that hold are those of its sender's last pose frame, which may not be those that are known.
             if !state.waits() {
                 if state.gap == 0 {
@@ -222,6 +228,9 @@ impl World {
         let refused_rows = self.find_rows(source, &frame.transforms, &mut rows);
         let refused_rows = refused_rows + self.take_rows(source, frame, &rows, times);
         self.sources[source.index()].rows = rows;
+        if cut {
+            self.cut_ways(source);
+        }
         let all = u64::try_from(frame.transforms.len()).unwrap_or(u64::MAX);
         let poses = all.saturating_sub(refused_rows);
         let refused_rows = refused_rows + self.refuse_bodies(source, frame);
@@ -325,10 +334,10 @@ impl World {
 
     /// Tells header and receipt (`CLOCK_BOOTTIME`, nanoseconds) of the newest frame of each source that was admitted
     /// since the last call.
-    pub fn tell_admitted(&mut self, mut tell: impl FnMut(&FrameHeader, u64)) {
-        for source in &mut self.sources {
+    pub fn tell_admitted(&mut self, mut tell: impl FnMut(SourceSlot, &FrameHeader, u64)) {
+        for (place, source) in self.sources.iter_mut().enumerate() {
             if let Some((header, received_ns)) = source.admitted.take() {
-                tell(&header, received_ns);
+                tell(SourceSlot::at(place), &header, received_ns);
             }
         }
     }

@@ -119,6 +119,17 @@ impl Ages {
         (deadline_ns != NONE).then_some(deadline_ns)
     }
 
+    /// The first slot from `from` on whose deadline is reached, as of the last sweep.
+    fn next_due(&self, from: usize, now_ns: u64) -> Option<BodySlot> {
+        let first = from / BLOCK;
+        let blocks = self.ends.iter().enumerate().skip(first);
+        let due = blocks.filter(|(_, ends)| ends.next_ns <= now_ns);
+        let mut slots = due.flat_map(|(block, _)| from.max(block * BLOCK)..(block + 1) * BLOCK);
+        let is_due = |age: &Age| age.deadline_ns <= now_ns;
+        let at = slots.find(|&at| self.list.get(at).is_some_and(is_due))?;
+        Some(BodySlot::at(at))
+    }
+
     /// The oldest and the newest stamp, as of the last sweep.
     pub(super) fn stamps(&self) -> (u64, u64) {
         let Ends {
@@ -218,15 +229,10 @@ impl World {
     }
 
     fn settle_expired(&mut self) {
-        for index in 0..self.bodies.len() {
-            let slot = BodySlot::at(index);
-            if self
-                .ages
-                .deadline_ns(slot)
-                .is_some_and(|d| d <= self.now_ns)
-            {
-                self.settle(slot, false);
-            }
+        let mut from = 0;
+        while let Some(slot) = self.ages.next_due(from, self.now_ns) {
+            self.settle(slot, false);
+            from = slot.index() + 1;
         }
     }
 
@@ -349,6 +355,13 @@ mod tests {
                 assert_eq!(ages.stamps(), ends);
                 assert_eq!(ages.next_ns(), set.iter().filter_map(|age| age.0).min());
                 assert!(ages.are_whole());
+                let now_ns = (random.unit() * 1e6) as u64;
+                let is_due = |at: &usize| set[*at].0.is_some_and(|due_ns| due_ns <= now_ns);
+                let mut told = Vec::new();
+                while let Some(slot) = ages.next_due(told.last().map_or(0, |at| at + 1), now_ns) {
+                    told.push(slot.index());
+                }
+                assert_eq!(told, (0..set.len()).filter(is_due).collect::<Vec<_>>());
             }
         }
         ages.sweep();

@@ -31,6 +31,8 @@ impl World {
             (Reason::Stale, of(BodyStatus::Stale) > 0),
             (Reason::Held, of(BodyStatus::Held) > 0),
             (Reason::RemovedByAge, of(BodyStatus::RemovedByAge) > 0),
+            // Whatever stands beside the way that is gone may have been hit.
+            (Reason::Truncated, self.sources.iter().any(|s| s.cut)),
             (
                 Reason::NoInput,
                 bodies == of(BodyStatus::Disabled) || silent,

@@ -49,6 +49,8 @@ struct After {
     slots: Vec<BodySlot>,
     /// Bodies that were hung on another or let go.
     hung: Vec<BodySlot>,
+    /// Slots of bodies that were enabled or disabled, any number of times; some may be empty by now.
+    enabled: Vec<BodySlot>,
     /// Where bodies are by now.
     places: Places,
 }
@@ -101,6 +103,9 @@ impl World {
             step();
         }
         self.relist(&mut after.slots);
+        for &slot in &after.enabled {
+            self.settle(slot, false);
+        }
         if self.edit_rules(edits) {
             after.changed = true;
             after.uncounted = Uncounted::Rules;
@@ -136,7 +141,7 @@ impl World {
         let changed = match edit {
             Edit::Put(put) => self.put(&put.body, &put.shapes, after),
             Edit::Remove { name } => self.remove(name, after),
-            Edit::Enable { name, enabled } => self.enable(name, *enabled),
+            Edit::Enable { name, enabled } => self.enable(name, *enabled, &mut after.enabled),
             Edit::Filter { name, group, mask } => self.filter(name, *group, *mask),
             Edit::Margin {
                 name,
@@ -311,7 +316,8 @@ impl World {
         true
     }
 
-    fn enable(&mut self, name: &str, enabled: bool) -> bool {
+    /// Enables or disables a body, which is settled behind the last edit: what is undone until then was never there.
+    fn enable(&mut self, name: &str, enabled: bool, slots: &mut Vec<BodySlot>) -> bool {
         let Some(slot) = self.slot_named(name) else {
             return false;
         };
@@ -323,7 +329,7 @@ impl World {
         if let Some(hot) = self.hot(slot) {
             hot.set(ENABLED, enabled);
         }
-        self.settle(slot, false);
+        slots.push(slot);
         true
     }
 

@@ -39,7 +39,7 @@ pub struct Path {
     ahead: bool,
     /// The body is not in the broad phase now: its path only matters to bodies attached to it.
     pub(super) aside: bool,
-    /// Not every pose fitted: the rest is covered only by the box.
+    /// Not every pose fitted, or some were dropped before: the rest is covered only by the box, if at all.
     blurred: bool,
     /// Contains the body at the newest pose.
     end: Aabb,
@@ -141,7 +141,7 @@ impl Path {
         share <= 0.0 || (share >= 1.0 && !self.ahead)
     }
 
-    /// Returns whether more poses came than are kept: the legs do not cover the whole path.
+    /// Returns whether more poses came than are kept, or some are gone: the legs do not cover the whole path.
     #[must_use]
     pub fn is_blurred(&self) -> bool {
         self.blurred
@@ -222,7 +222,12 @@ impl Path {
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        self.legs.is_empty()
+        self.legs.is_empty() && !self.blurred
+    }
+
+    /// A part of the way is not known.
+    pub(super) fn blur(&mut self) {
+        self.blurred = true;
     }
 
     pub(super) fn set_pivot(&mut self, pivot: Point, radius: f64) {
@@ -334,7 +339,7 @@ impl Path {
         self.hull = self.hull.merged(&end);
         self.end = end;
         self.blurred = root.blurred;
-        if root.blurred && self.swept {
+        if root.blurred && self.swept && !root.legs.is_empty() {
             // Legs that did not fit: it was no farther than this from the places of the pivot.
             let pivots = &root.pivots;
             let far = pivots.min.coords.amax().max(pivots.max.coords.amax());

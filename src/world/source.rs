@@ -61,6 +61,10 @@ pub struct SourceState {
     pub(super) gap: u64,
     /// Whether a continuous body goes where its frames say.
     pub(super) followed: bool,
+    /// In this tick, a part of the way of its continuous bodies is not known: frames were dropped here.
+    pub(super) cut: bool,
+    /// The same of the next frame with poses.
+    pub(super) cuts_next: bool,
 }
 
 /// Frames that wait for a scene revision, or behind one that does, the oldest first.
@@ -104,6 +108,11 @@ impl Waiting {
             received_ns,
             ..frame.clone()
         });
+        if gone > 0
+            && let Some(first) = self.frames.front_mut()
+        {
+            first.cut = true;
+        }
         gone
     }
 
@@ -147,6 +156,8 @@ impl SourceState {
             bends: BendsWaiting::default(),
             gap: 0,
             followed: false,
+            cut: false,
+            cuts_next: false,
         }
     }
 
@@ -305,11 +316,13 @@ impl SourceState {
 /// Judges a header by session and order, and takes note of it: which session is in force, when it was heard.
 ///
 /// A session ends here when another asks and it has not been heard for the source's time-out.
+///
+/// * `first_seq` - least number of the frames that this one stands for.
 pub(super) fn stand(
     source: &mut SourceState,
     slot: SourceSlot,
     over: &mut SessionsOver,
-    header: &FrameHeader,
+    (header, first_seq): (&FrameHeader, u64),
     received_ns: u64,
 ) -> Standing {
     let order = (header.epoch, header.seq);
@@ -336,7 +349,7 @@ pub(super) fn stand(
     match source.order {
         Some(newest) if order <= newest => Standing::Refused(RejectReason::OldFrame),
         Some((epoch, seq)) if header.epoch == epoch => {
-            if header.seq > seq.saturating_add(1) {
+            if first_seq > seq.saturating_add(1) {
                 source.gap = header.seq;
             }
             source.order = Some(order);
@@ -374,7 +387,7 @@ pub(super) fn stand_beside(
         epoch: header.epoch,
         ..FrameHeader::default()
     };
-    stand(source, slot, over, &first, received_ns)
+    stand(source, slot, over, (&first, first.seq), received_ns)
 }
 
 /// Whether a source may move a body.

@@ -9,7 +9,7 @@
 use super::World;
 use super::path::Path;
 use super::place::tight_box;
-use crate::ids::BodySlot;
+use crate::ids::{BodySlot, SourceSlot};
 use crate::math::{Aabb, Pose, Vec3};
 
 impl World {
@@ -47,7 +47,7 @@ impl World {
     /// A tick begins: earlier motion has been reported, boxes are tight again.
     pub(super) fn end_travels(&mut self) {
         for source in &mut self.sources {
-            source.pose_frames = 0;
+            (source.pose_frames, source.cut) = (0, false);
         }
         for at in 0..self.travelled.len() {
             let slot = self.travelled[at];
@@ -176,6 +176,30 @@ impl World {
         entry.tight = *path.hull();
         body.path = Some(path);
         moved || grown
+    }
+
+    /// Frames of a source were dropped before its newest one: what its continuous bodies met on that part of their path
+    /// is not known.
+    pub(super) fn cut_ways(&mut self, source: SourceSlot) {
+        let state = &mut self.sources[source.index()];
+        if !state.followed {
+            return;
+        }
+        state.cut = true;
+        for at in 0..self.pathed.len() {
+            let slot = self.pathed[at];
+            let root = self.body(self.entries[slot.index()].root);
+            if root.is_none_or(|root| root.source != Some(source)) {
+                continue;
+            }
+            let body = self.bodies[slot.index()].as_mut();
+            if let Some(path) = body.and_then(|body| body.path.as_mut()) {
+                if path.is_empty() {
+                    self.travelled.push(slot);
+                }
+                path.blur();
+            }
+        }
     }
 
     /// An edit placed the body: that is no motion.

@@ -84,6 +84,41 @@ fn law_4_5_the_time_that_a_frame_has_left_counts_from_its_receipt() {
 }
 
 #[test]
+fn law_4_5_bug_what_a_tick_took_before_it_began_was_charged_twice_to_the_time_that_a_frame_has_left()
+ {
+    let mut rig = pairs();
+    // The frame comes at the wake-up, and 0.2 ms pass before the tick.
+    (rig.woken_ns, rig.time_left_ns) = (200_000, SHORT_NS + 200_000);
+    let row = collide(&mut rig, ALL);
+    let budget_ns = row.budget_ns - 200_000;
+    assert!(
+        (SHORT_NS - 10 * LOOK_NS..=SHORT_NS).contains(&budget_ns),
+        "{budget_ns} ns"
+    );
+    assert!(row.possible > 100 && row.units > 200);
+    assert_eq!((row.overrun, row.missed), (0, 0));
+}
+
+#[test]
+fn law_4_5_bug_a_tick_of_the_leading_source_was_cut_short_for_the_frame_of_another() {
+    for (lead, is_short) in [(None, true), (Some(0), true), (Some(1), false)] {
+        let mut rig = pairs();
+        // It was over long before the lead sent.
+        (rig.deadline_ns, rig.lead) = (1, lead);
+        let row = collide(&mut rig, ALL);
+        let budget_ns = if is_short { 0 } else { u64::MAX };
+        assert_eq!(
+            (row.budget_ns, row.overrun),
+            (budget_ns, u8::from(is_short))
+        );
+        assert_eq!(row.possible == PAIRS, is_short);
+        // Nor is it for the next tick.
+        rig.deadline_ns = 0;
+        assert_eq!(collide(&mut rig, ALL).budget_ns, u64::MAX);
+    }
+}
+
+#[test]
 fn law_4_5_a_frames_deadline_never_lengthens_the_budget() {
     let budget = Budget::time_ns(SHORT_NS);
     let plain = collide(&mut pairs(), budget);
@@ -91,12 +126,17 @@ fn law_4_5_a_frames_deadline_never_lengthens_the_budget() {
     assert!(plain.possible > 100);
     let mut rig = pairs();
     rig.deadline_ns = after(&rig, LONG_NS);
-    rig.time_left_ns = LONG_NS;
     let row = collide(&mut rig, budget);
     assert_eq!(
         (row.budget_ns, row.units, row.elapsed_ns),
         (SHORT_NS, plain.units, plain.elapsed_ns)
     );
+    let mut rig = pairs();
+    rig.time_left_ns = LONG_NS;
+    let row = collide(&mut rig, budget);
+    // Two looks at the clock tell when the frame came.
+    assert_eq!(row.budget_ns, SHORT_NS);
+    assert!(row.units <= plain.units && row.units + 3 > plain.units);
     // Nor does it give more work units than are allowed.
     let mut rig = pairs();
     rig.deadline_ns = after(&rig, LONG_NS);

@@ -104,6 +104,10 @@ pub(crate) struct Rig {
     pub(crate) scene_rev: u64,
     /// Between a frame's receipt and its tick.
     pub(crate) waited_ns: u64,
+    /// Between a tick's wake-up and the tick.
+    pub(crate) woken_ns: u64,
+    /// Place of the source whose tick each is; `None`: everybody's.
+    pub(crate) lead: Option<usize>,
     /// Ticks that went out alone while the last one was under way.
     pub(crate) pulses: Vec<TickRow>,
     /// Whether the whole structure is checked after each tick.
@@ -144,6 +148,8 @@ impl Rig {
             time_left_ns: 0,
             scene_rev: 0,
             waited_ns: 0,
+            woken_ns: 0,
+            lead: None,
             pulses: Vec::new(),
             checked: true,
             seq: 0,
@@ -279,14 +285,16 @@ impl Rig {
     fn tick(&mut self, budget: Budget, edits: &[EditBatch], cause: TickCause) -> &Outbox {
         self.pulses.clear();
         let mut pulse = |row: &TickRow| self.pulses.push(*row);
+        let woke_ns = self.clock.monotonic_ns();
+        self.clock.advance(self.woken_ns);
         let input = TickInput {
             inbox: &self.inbox,
             edits,
             demand: self.demand,
             budget,
             cause,
-            cause_source: None,
-            woke_ns: self.clock.monotonic_ns(),
+            cause_source: self.lead,
+            woke_ns,
             pulse: Some(&mut pulse),
         };
         self.out.clone_from(self.engine.tick(input));

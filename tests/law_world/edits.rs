@@ -429,6 +429,37 @@ fn law_3_5_disabling_ends_by_cause_and_enabling_brings_the_pose_that_came_meanwh
 }
 
 #[test]
+fn law_3_5_bug_a_body_disabled_and_enabled_in_one_request_ended_and_began_its_collisions() {
+    let mut bench = Bench::of(vec![moving("a", 1), moving("b", 2), fixed("wall", 3, 0.0)]);
+    bench.send(1, "sim", 1, &[row(1, 0.0), row(2, 0.0)]);
+    let enable = |name: &str, enabled| Edit::Enable {
+        name: named(name),
+        enabled,
+    };
+    bench.tick += 1;
+    bench.world.begin_tick(bench.tick, bench.now_ns);
+    let rev = bench.world.scene_rev();
+    let there_and_back = [enable("a", false), enable("b", false), enable("a", true)];
+    let applied = bench.world.apply(&there_and_back).unwrap();
+    assert!(applied.changed && applied.scene_rev == rev + 1);
+    assert_eq!((bench.removed("a"), bench.inserted("a")), (None, false));
+    assert_eq!(bench.removed("b"), Some(EndCause::Disabled));
+    assert_eq!(bench.status("b"), BodyStatus::Disabled);
+    // Of one that is gone behind it, or another by then, nothing is left to be done.
+    let gone = [
+        enable("b", true),
+        Edit::Remove { name: named("b") },
+        enable("a", false),
+        put(moving("a", 1)),
+    ];
+    bench.world.apply(&gone).unwrap();
+    bench.world.age(bench.now_ns);
+    bench.world.validate().unwrap();
+    assert_eq!(bench.status("a"), BodyStatus::NotReceived);
+    assert_eq!(bench.world.slot_named("b"), None);
+}
+
+#[test]
 fn law_3_5_a_reset_ends_all_pairs_and_forgets_all_poses() {
     let mut robot = moving("b", 2);
     robot.source = Some(1);

@@ -581,7 +581,7 @@ class Reason(IntEnum):
     REMOVED_BY_AGE = 3
     # A body's newest pose or vertices were refused.
     REJECTED = 4
-    # Rows or pairs did not fit.
+    # Rows, pairs or frames of a path did not fit.
     TRUNCATED = 5
     # Work was not finished.
     UNDECIDED = 6

@@ -106,6 +106,7 @@ fn fill_inbox(inbox: &mut Inbox) {
     frame.velocities = vec![[odd(0); 6]];
     frame.stamps_ns = vec![u64::MAX];
     frame.since_ns = vec![7];
+    (frame.first_seq, frame.cut) = (u64::MAX - 1, true);
     frame.refused_bodies = vec![(8, RejectReason::BadChain)];
     // One without anything.
     inbox.push();

@@ -2,13 +2,11 @@
 //!
 //! In: the frames of a drain. Out: the frames of a tick. A full frame stands for the older ones of its session, which
 //! are passed over and counted; a partial one does not, because those may hold bodies that it lacks, and one of a
-//! source that moves continuous bodies does not, because those are on their way.
+//! source that moves continuous bodies does not, because those are on their way. A pause stands for the one before it.
 
-use super::source::Source;
-use crate::limits::{
-    FRAMES_PER_DRAIN_MAX, SOURCES_MAX, VERTEX_FRAMES_WAITING_MAX, VERTEX_ROWS_WAITING_MAX,
-};
-use crate::wire::{Frame, Inbox, VertexFrame, VertexHeader, WIRE_VERSION, frame_flags};
+use super::fold::{fold, is_sound};
+use crate::limits::{FRAME_ROWS_MAX, FRAMES_PER_DRAIN_MAX, FRAMES_WAITING_MAX, SOURCES_MAX};
+use crate::wire::{Frame, Inbox, frame_flags};
 
 /// Whose a frame is.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,11 +26,30 @@ pub(super) struct Held {
     pub(super) whose: Whose,
 }
 
+impl Held {
+    pub(super) fn is_pause(&self) -> bool {
+        self.frame.header.flags == frame_flags::PAUSED
+    }
+}
+
+/// What the frames of a source are for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Turn {
+    /// Each makes a tick of its own.
+    Each,
+    /// All go with the next tick: each is a part of a body's way.
+    Way,
+    /// The newest poses go with the next tick.
+    Newest,
+}
+
 /// The frames that wait, and spare memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Queue {
     frames: Vec<Held>,
     spare: Vec<Held>,
+    /// Memory of [`fold`].
+    ids: Vec<u64>,
 }
 
 impl Queue {
@@ -46,24 +63,22 @@ impl Queue {
 
     /// Takes one frame out of an inbox.
     ///
-    /// * `stands_alone` - each frame of this source makes a tick of its own, or is a part of a body's way: none is
-    ///   passed over for a newer one.
+    /// * `turn` - what the frames of this source are for: where each counts, none with poses is passed over for a newer
+    ///   one.
     /// * returns - how many frames of its source are passed over for it.
-    pub(super) fn put(&mut self, frame: &mut Frame, whose: Whose, stands_alone: bool) -> u64 {
+    pub(super) fn put(&mut self, frame: &mut Frame, whose: Whose, turn: Turn) -> u64 {
         let mut held = self.spare.pop().unwrap_or_default();
         std::mem::swap(&mut held.frame, frame);
         held.whose = whose;
         let mut passed = 0;
         let mut place = None;
-        if !stands_alone && is_whole(&held.frame) {
+        if turn == Turn::Newest && is_whole(&held.frame) {
             // It takes the place of the oldest that it stands for: a session that was heard in time must not seem
             // silent to one that asked in between.
             place = self.frames.iter().position(|old| replaces(&held, old));
             // A pause behind that place would come too late: what it says holds is said anew.
             let overtaken = |at: usize, old: &Held| {
-                old.frame.header.flags == frame_flags::PAUSED
-                    && place.is_some_and(|place| place < at)
-                    && is_newer(&held, old)
+                old.is_pause() && place.is_some_and(|place| place < at) && is_newer(&held, old)
             };
             for at in (0..self.frames.len()).rev() {
                 let old = &self.frames[at];
@@ -75,23 +90,103 @@ impl Queue {
             // Any other keeps its turn.
             let before = self.frames.iter().rposition(|old| is_newer(&held, old));
             place = place.map(|place| place.max(before.map_or(0, |before| before + 1)));
-        }
-        let of_source = |old: &Held| old.whose.source == whose.source;
-        if self.frames.iter().filter(|old| of_source(old)).count() >= FRAMES_PER_DRAIN_MAX {
-            passed += 1;
-            // What the world would refuse makes room first, be it the newest.
-            let stranger = |old: &Held| of_source(old) && !old.whose.speaks;
-            let crowded_out = self.frames.iter().position(stranger);
-            let oldest = || whose.speaks.then(|| self.frames.iter().position(of_source));
-            let Some(at) = crowded_out.or_else(|| oldest().flatten()) else {
-                self.spare.push(held);
-                return passed;
-            };
+        } else if turn != Turn::Each
+            && let Some(at) = self.pause_before(&held)
+        {
+            let old = &self.frames[at].frame;
+            (held.frame.first_seq, held.frame.cut) = (old.stands_from(), old.cut);
             self.drop_at(at);
+            passed += 1;
+            place = Some(at);
         }
+        passed += self.make_room(&mut held, turn);
         let end = self.frames.len();
         self.frames.insert(place.unwrap_or(end).min(end), held);
         passed
+    }
+
+    /// The pause right before this one, which says of the same poses that they hold: none that was sent in between was
+    /// lost.
+    fn pause_before(&self, held: &Held) -> Option<usize> {
+        let (frame, whose) = (&held.frame, &held.whose);
+        if !(held.is_pause() && whose.speaks) || frame.waited && frame.header.sent_ns == 0 {
+            return None;
+        }
+        let at = self
+            .frames
+            .iter()
+            .rposition(|old| is_of_session(held, old))?;
+        let (old, header) = (&self.frames[at], &self.frames[at].frame.header);
+        let follows = header.seq.checked_add(1) == Some(frame.header.seq);
+        (old.is_pause() && old.whose.speaks && header.epoch == frame.header.epoch && follows)
+            .then_some(at)
+    }
+
+    /// Makes room for one more frame of its source.
+    ///
+    /// * returns - how many are passed over for it.
+    fn make_room(&mut self, held: &mut Held, turn: Turn) -> u64 {
+        let (source, speaks) = (held.whose.source, held.whose.speaks);
+        // What the world would refuse takes nobody's room but that of its like.
+        let alike = |old: &Held| old.whose.source == source && old.whose.speaks == speaks;
+        let each_counts = speaks && turn != Turn::Newest;
+        let mut passed = 0;
+        loop {
+            let (mut frames, mut rows) = (1, held.frame.transforms.len());
+            for old in self.frames.iter().filter(|old| alike(old)) {
+                frames += 1;
+                rows += old.frame.transforms.len();
+            }
+            let fits_many = frames <= FRAMES_WAITING_MAX && rows <= FRAME_ROWS_MAX;
+            if frames <= FRAMES_PER_DRAIN_MAX || each_counts && fits_many {
+                return passed;
+            }
+            passed += 1;
+            if speaks && turn == Turn::Newest && self.fold_oldest(held) {
+                continue;
+            }
+            // Without the one before it a pause renews nothing: it is what can be missed.
+            let pause = |old: &Held| turn == Turn::Newest && alike(old) && old.is_pause();
+            let pause = self.frames.iter().position(pause);
+            let Some(at) = pause.or_else(|| self.frames.iter().position(alike)) else {
+                return passed;
+            };
+            let gone = self.frames.remove(at);
+            let mut behind = self.frames[at..].iter_mut().chain([&mut *held]);
+            if let Some(next) = behind.find(|next| is_newer(next, &gone)) {
+                next.frame.cut = true;
+            }
+            self.spare.push(gone);
+        }
+    }
+
+    /// Folds a frame of a source into the next one with poses, the oldest that can be; whether any could. Not into the
+    /// last of them: a pause renews the bodies of that one alone.
+    fn fold_oldest(&mut self, held: &Held) -> bool {
+        let has_poses = |other: &Held| {
+            let whose = (other.whose.source, other.whose.speaks);
+            whose == (held.whose.source, held.whose.speaks) && !other.is_pause()
+        };
+        let last = self.frames.iter().rposition(has_poses);
+        let last = last.filter(|_| !has_poses(held));
+        let mut older: Option<usize> = None;
+        for at in 0..self.frames.len() {
+            if !has_poses(&self.frames[at]) || last == Some(at) {
+                continue;
+            }
+            if let Some(older) = older {
+                let (front, back) = self.frames.split_at_mut(at);
+                let (old, new) = (&front[older], &mut back[0]);
+                let (a, b) = (&old.frame.header, &new.frame.header);
+                let are_of_one = is_newer(new, old) && a.epoch == b.epoch;
+                if are_of_one && fold(old, new, &mut self.ids) {
+                    self.drop_at(older);
+                    return true;
+                }
+            }
+            older = Some(at);
+        }
+        false
     }
 
     /// Hands out the frames that `wanted` picks, the oldest first.
@@ -128,173 +223,9 @@ impl Queue {
     }
 }
 
-/// Vertices that wait, and spare memory.
-///
-/// None is passed over for a newer one, and those of a session go out in the order of their sending: a range stands on
-/// the version before. They wait for the frame of their session that they belong with, so that a tick has vertices and
-/// poses of one moment: those of the source each of whose frames makes a tick, and those whose frame is in a round that
-/// is under way, until it goes out; the others for a time-out of their source at most, for a frame that is lost, or one
-/// that waits for a lead who is silent, must not keep back a shape that is known. Without a frame of their own those of
-/// a new session wait for the frames of the one before.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Vertices {
-    waiting: Vec<Bent>,
-    spare: Vec<VertexFrame>,
-    /// Sessions of which a message goes out with its frame in the tick that is being made, and the place of the last
-    /// one: what was sent before it goes, too.
-    going: Vec<(Whom, usize)>,
-    /// Sessions of which a message waits on: so does what was sent after it.
-    staying: Vec<Whom>,
-}
-
-/// Place of a source, and a session.
-type Whom = (Option<usize>, u64);
-
-/// What there is to wait for as a tick is made.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ahead<'a> {
-    pub(super) now_ns: u64,
-    /// Place of the source each of whose frames makes a tick of its own.
-    pub(super) lead: Option<usize>,
-    /// Nobody's vertices wait for a frame but those of who speaks: others are refused, and that is told soon.
-    pub(super) sources: &'a [Source],
-    /// Those that go on waiting.
-    pub(super) frames: &'a [Held],
-}
-
-/// A message of vertices that waits.
-#[derive(Clone, Debug, Default)]
-struct Bent {
-    frame: VertexFrame,
-    /// Place of its source.
-    source: Option<usize>,
-    /// Its receipt, nanoseconds of `CLOCK_BOOTTIME`.
-    received_ns: u64,
-}
-
-impl Vertices {
-    /// Takes vertices out of an inbox. Of more than a source may have waiting the oldest go: the numbers of those that
-    /// follow tell that they are missing.
-    pub(super) fn put(&mut self, frame: &mut VertexFrame, source: Option<usize>, received_ns: u64) {
-        while let Some(oldest) = self.crowded_out_by(frame, source) {
-            let oldest = self.waiting.remove(oldest);
-            self.spare.push(oldest.frame);
-        }
-        let mut held = Bent {
-            frame: self.spare.pop().unwrap_or_default(),
-            source,
-            received_ns,
-        };
-        std::mem::swap(&mut held.frame, frame);
-        self.waiting.push(held);
-    }
-
-    /// The oldest of a source, where this one of it is one message or one row too many.
-    fn crowded_out_by(&self, frame: &VertexFrame, source: Option<usize>) -> Option<usize> {
-        let of_source = |held: &&Bent| held.source == source;
-        let (mut messages, mut rows) = (0, frame.rows.len());
-        for held in self.waiting.iter().filter(of_source) {
-            messages += 1;
-            rows += held.frame.rows.len();
-        }
-        let fits = messages < VERTEX_FRAMES_WAITING_MAX && rows <= VERTEX_ROWS_WAITING_MAX;
-        let oldest = self.waiting.iter().position(|held| of_source(&held));
-        oldest.filter(|_| !fits)
-    }
-
-    /// Hands out what a tick with these frames takes.
-    pub(super) fn take(&mut self, into: &mut Inbox, ahead: Ahead<'_>) {
-        self.going.clear();
-        self.staying.clear();
-        for (at, held) in self.waiting.iter().enumerate().rev() {
-            let header = &held.frame.header;
-            let is_told = self.going.iter().any(|(whom, _)| *whom == held.whom());
-            let of_tick = || into.frames().iter().any(|frame| belongs(header, frame));
-            if !is_told && header.seq != 0 && of_tick() {
-                self.going.push((held.whom(), at));
-            }
-        }
-        let mut kept = 0;
-        for at in 0..self.waiting.len() {
-            let held = &self.waiting[at];
-            let whom = held.whom();
-            let goes = |(of, last): &(Whom, usize)| *of == whom && at <= *last;
-            let is_behind = self.staying.contains(&whom);
-            if !self.going.iter().any(goes) && (is_behind || held.waits(into, ahead)) {
-                if !is_behind {
-                    self.staying.push(whom);
-                }
-                self.waiting.swap(kept, at);
-                kept += 1;
-            } else {
-                std::mem::swap(into.push_vertices(), &mut self.waiting[at].frame);
-            }
-        }
-        self.spare
-            .extend(self.waiting.drain(kept..).map(|held| held.frame));
-    }
-
-    /// Drops what a session that is over has left without a frame.
-    pub(super) fn forget(&mut self, session: u64) {
-        let Self { waiting, spare, .. } = self;
-        waiting.retain_mut(|held| {
-            let stays = held.frame.header.session != session;
-            if !stays {
-                spare.push(std::mem::take(&mut held.frame));
-            }
-            stays
-        });
-    }
-}
-
-impl Bent {
-    fn whom(&self) -> Whom {
-        (self.source, self.frame.header.session)
-    }
-
-    /// Whether it waits for a frame of its own, or for those of the session before.
-    fn waits(&self, into: &Inbox, ahead: Ahead<'_>) -> bool {
-        let own = |frame: &Frame| frame.header.session == self.frame.header.session;
-        let before = |held: &Held| {
-            held.whose.source == self.source && held.whose.speaks && !own(&held.frame)
-        };
-        self.waits_for_its_frame(ahead)
-            || ahead.frames.iter().any(before) && !into.frames().iter().any(own)
-    }
-
-    fn waits_for_its_frame(&self, ahead: Ahead<'_>) -> bool {
-        let header = &self.frame.header;
-        let source = self.source.and_then(|place| ahead.sources.get(place));
-        let Some(source) = source.filter(|_| header.seq != 0) else {
-            return false;
-        };
-        let is_there = |held: &Held| held.whose.speaks && belongs(header, &held.frame);
-        let is_there = ahead.frames.iter().any(is_there);
-        let in_round = ahead.lead.is_none() && is_there;
-        let speaks = source.alive(ahead.now_ns);
-        let speaks = speaks.is_none_or(|session| session == header.session);
-        let is_young = ahead.now_ns.saturating_sub(self.received_ns) < source.timeout_ns;
-        let may_come = is_young && (is_there || !source.has_heard(header));
-        in_round || speaks && (ahead.lead == self.source || may_come)
-    }
-}
-
-/// Whether vertices may go out with a frame: it is the one that they belong with, or came after it.
-fn belongs(vertices: &VertexHeader, frame: &Frame) -> bool {
-    let frame = &frame.header;
-    frame.source == vertices.source
-        && frame.session == vertices.session
-        && (frame.epoch, frame.seq) >= (vertices.epoch, vertices.seq)
-}
-
 /// Whether nothing in the frame itself keeps the world from taking it: only then may an older one be dropped for it.
 fn is_whole(frame: &Frame) -> bool {
-    let rows = frame.transforms.len();
-    frame.header.flags == frame_flags::FULL
-        && frame.header.schema == WIRE_VERSION
-        && frame.refused.is_none()
-        && (frame.velocities.is_empty() || frame.velocities.len() == rows)
-        && !(frame.waited && frame.header.sent_ns == 0)
+    frame.header.flags == frame_flags::FULL && is_sound(frame)
 }
 
 /// Whether the world would take the new frame wherever it would take the old one, and then not need the old one.
@@ -305,7 +236,9 @@ fn replaces(new: &Held, old: &Held) -> bool {
 /// Whether the one is of the same session as the other, and was sent after it.
 fn is_newer(new: &Held, old: &Held) -> bool {
     let (a, b) = (&new.frame.header, &old.frame.header);
-    new.whose.source == old.whose.source
-        && a.session == b.session
-        && (a.epoch, a.seq) > (b.epoch, b.seq)
+    is_of_session(new, old) && (a.epoch, a.seq) > (b.epoch, b.seq)
+}
+
+fn is_of_session(one: &Held, other: &Held) -> bool {
+    one.whose.source == other.whose.source && one.frame.header.session == other.frame.header.session
 }

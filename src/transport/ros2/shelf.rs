@@ -146,6 +146,11 @@ impl Shelf {
             && let Some(at) = waiting.frames.iter().position(of_source)
             && let Some((_, oldest)) = waiting.frames.remove(at)
         {
+            let session = oldest.header.session;
+            let of_session = |next: &&mut (Option<usize>, Frame)| next.1.header.session == session;
+            if let Some((_, next)) = waiting.frames.range_mut(at..).find(of_session) {
+                next.cut = true;
+            }
             waiting.spare.push(oldest);
             self.passed_over.fetch_add(1, Ordering::Relaxed);
         }

@@ -36,6 +36,7 @@ pub(super) fn fill(frame: &mut Frame, message: &BodyTransforms, book: &Book, rec
     frame.received_ns = receipt.now_ns;
     frame.waited = receipt.waited;
     frame.refused = None;
+    (frame.first_seq, frame.cut) = (0, false);
     frame.transforms.clear();
     frame.velocities.clear();
     frame.stamps_ns.clear();
