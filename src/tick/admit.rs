@@ -4,9 +4,8 @@
 
 use std::sync::Arc;
 
-use super::beat::beat;
 use super::floor::Laps;
-use super::{EditOutcome, Engine, TickInput};
+use super::{EditOutcome, Engine, TickInput, beat};
 use crate::plan::Seen;
 use crate::time::Meter;
 use crate::wire::{Frame, Inbox, SOURCE_NAME_LEN, TickCause};
@@ -43,9 +42,9 @@ impl Engine {
         let row = self.bare_tick(input);
         let clock = Arc::clone(&self.clock);
         let mut beat = beat(&mut input.pulse, row, clock.as_ref());
-        let (from_ns, heartbeat_ns) = (self.beats_from(laps.woke_ns()), self.config.heartbeat_ns);
+        let heartbeat_ns = self.config.heartbeat_ns;
         let mut meter =
-            Meter::unlimited(clock.as_ref()).with_beat(from_ns, heartbeat_ns, &mut beat);
+            Meter::unlimited(clock.as_ref()).with_beat(laps.woke_ns(), heartbeat_ns, &mut beat);
         for batch in input.edits {
             let (token, mut warnings) = (batch.token, batch.warnings.clone());
             if batch.validate {

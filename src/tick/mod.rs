@@ -5,7 +5,6 @@
 
 mod admit;
 mod audience;
-mod beat;
 pub mod build;
 mod end;
 mod floor;
@@ -31,11 +30,13 @@ use crate::plan::{Kinds, Plan, Seen};
 use crate::publish::{Publisher, View};
 use crate::scene::Scene;
 use crate::time::{Clock, Meter};
-use crate::wire::{BroadCause, BroadMode, Demand, Outbox, RejectReason, Stage};
+use crate::wire::{
+    BroadCause, BroadMode, Demand, MessageHeader, Outbox, Reason, RejectReason, Stage, State,
+    TickRow, WIRE_VERSION,
+};
 use crate::world::{ChangeSet, Parts, World};
 
 use audience::Audience;
-use beat::beat;
 use end::End;
 use floor::{Began, Floor, Laps};
 use rest::Rest;
@@ -77,8 +78,6 @@ pub struct Engine {
     tick: u64,
     /// Time of this tick, nanoseconds of `CLOCK_BOOTTIME`.
     now_ns: u64,
-    /// When the tick before was done, nanoseconds of `CLOCK_MONOTONIC`.
-    told_ns: Option<u64>,
     end: End,
     missed: u64,
     rebuilds: u64,
@@ -143,7 +142,6 @@ impl Engine {
             rest: Rest::default(),
             tick: 0,
             now_ns,
-            told_ns: None,
             end: End::default(),
             missed: 0,
             rebuilds: 0,
@@ -282,7 +280,7 @@ impl Engine {
         let clock = Arc::clone(&self.clock);
         let mut beat = beat(&mut input.pulse, row, clock.as_ref());
         let mut meter = Meter::new(clock.as_ref(), deadline_ns, budget.units).with_beat(
-            self.beats_from(laps.woke_ns()),
+            laps.woke_ns(),
             self.config.heartbeat_ns,
             &mut beat,
         );
@@ -298,6 +296,34 @@ impl Engine {
         let open = end_ns.filter(|_| !done && budget.units.is_none());
         self.rest.open = open.map(|end_ns| (wanted, end_ns));
         units
+    }
+
+    /// The tick that goes out alone while this one takes longer than a heartbeat. It has this tick's number, an earlier
+    /// `sent_ns`, and no sources: it is the result of no frame. What counts up in a boot is as it was.
+    fn bare_tick(&self, input: &TickInput<'_>) -> TickRow {
+        TickRow {
+            header: MessageHeader {
+                boot_id: self.boot_id,
+                tick: self.tick,
+                scene_rev: self.world.scene_rev(),
+                state: State::Unknown.code(),
+                schema: WIRE_VERSION,
+                ..MessageHeader::default()
+            },
+            budget_ns: self.end.budget_ns(),
+            budget_units: input.budget.units.unwrap_or(u64::MAX),
+            rejects: *self.world.rejects(),
+            bodies: self.world.counts().bodies,
+            unknown: self.world.counts().unknown,
+            candidates: self.pairs.len() as u64,
+            reasons: Reason::Undecided.bit(),
+            cause: input.cause.code(),
+            cause_source: place(input.cause_source),
+            missed: self.missed,
+            cancelled_events: self.out.tick.cancelled_events,
+            rebuilds: self.rebuilds,
+            ..TickRow::default()
+        }
     }
 
     fn publish(&mut self, demand: Demand) {
@@ -327,7 +353,6 @@ impl Engine {
         row.stage_ns[usize::from(Stage::Send.code())] = self.floor.last_send_ns();
         row.stage_ns[usize::from(Stage::Rest.code())] = std::mem::take(&mut self.rest.spent_ns);
         row.sent_ns = self.clock.boottime_ns();
-        self.told_ns = Some(laps.woke_ns().saturating_add(laps.elapsed_ns()));
         row.elapsed_ns = elapsed_ns;
         row.budget_ns = self.end.budget_ns();
         row.budget_units = input.budget.units.unwrap_or(u64::MAX);
@@ -342,6 +367,20 @@ impl Engine {
         row.broad_renewed = u32::try_from(broad.renewed).unwrap_or(u32::MAX);
         let (mode, cause) = broad.way.unwrap_or((BroadMode::Whole, BroadCause::None));
         (row.broad_mode, row.broad_cause) = (mode.code(), cause.code());
+    }
+}
+
+/// Sends a bare tick, now.
+fn beat<'a>(
+    pulse: &'a mut Option<&mut dyn FnMut(&TickRow)>,
+    mut row: TickRow,
+    clock: &'a dyn Clock,
+) -> impl FnMut() + 'a {
+    move || {
+        if let Some(pulse) = pulse {
+            row.sent_ns = clock.boottime_ns();
+            pulse(&row);
+        }
     }
 }
 

@@ -63,32 +63,6 @@ fn law_4_4_a_tick_longer_than_a_heartbeat_sends_tick_alone_between_its_slices() 
     assert!(row.sent_ns > last_ns, "the tick itself is the newest");
 }
 
-#[test]
-fn law_4_4_bug_the_heartbeat_of_a_long_tick_counted_from_its_wake_up_and_not_from_the_last_message()
-{
-    let mut rig = pairs();
-    rig.send(NONE);
-    let told_ns = rig.out.tick.sent_ns;
-    // Nothing happens for nearly a heartbeat; then a tick takes several.
-    rig.clock.advance(85_000_000);
-    rig.clock.step_each_read(LOOK_NS);
-    rig.send(ALL);
-    rig.clock.step_each_read(0);
-    assert!(rig.out.tick.elapsed_ns > 4 * HEARTBEAT_NS);
-    let silent_ns = rig.pulses[0].sent_ns - told_ns;
-    assert!(
-        silent_ns <= HEARTBEAT_NS * 5 / 4 + 30 * LOOK_NS,
-        "{silent_ns} ns"
-    );
-    // One that takes no more than its share is told as it is.
-    put_pairs(&mut rig, PAIRS, [1.5, 1.5]);
-    rig.clock.advance(85_000_000);
-    rig.clock.step_each_read(LOOK_NS / 100);
-    rig.send(ALL);
-    assert!(rig.out.tick.elapsed_ns > HEARTBEAT_NS / 100);
-    assert!(rig.pulses.is_empty());
-}
-
 /// A request is done as a whole, however many edits it has.
 #[test]
 fn bug_while_a_large_request_was_applied_nobody_heard_of_it() {
