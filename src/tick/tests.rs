@@ -15,7 +15,9 @@ use super::*;
 use crate::builtin::Random;
 use crate::daemon::build_shapes;
 use crate::time::{Budget, ManualClock};
-use crate::wire::{FrameHeader, Inbox, TickCause, TransformRow, frame_flags, name_bytes};
+use crate::wire::{
+    FrameHeader, Inbox, TickCause, TransformRow, WIRE_VERSION, frame_flags, name_bytes,
+};
 use crate::world::Edit;
 
 const BODIES: u64 = 60;

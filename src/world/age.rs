@@ -114,11 +114,6 @@ impl Ages {
         &mut self.list[slot.index()]
     }
 
-    pub(super) fn deadline_ns(&self, slot: BodySlot) -> Option<u64> {
-        let deadline_ns = self.list.get(slot.index())?.deadline_ns;
-        (deadline_ns != NONE).then_some(deadline_ns)
-    }
-
     /// The first slot from `from` on whose deadline is reached, as of the last sweep.
     fn next_due(&self, from: usize, now_ns: u64) -> Option<BodySlot> {
         let first = from / BLOCK;

@@ -171,7 +171,7 @@ fn a_body_is_tried_at_a_pose_and_a_shape_anywhere() {
         (&["--touching", "a", "--at=1,x,2"], &["`x`"]),
         (&["--touching", "a", "--within", "5"], &["not a length"]),
         (&["--touching", "a", "b"], &["cannot be used"]),
-        (&["--shape", "{"], &["no JSON"]),
+        (&["--shape", "{"], &["not JSON"]),
         (&["a", "b", "--at=0,0,0"], &["cannot be used"]),
     ] {
         let ended = ask(&desk, args);
