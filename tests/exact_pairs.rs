@@ -731,3 +731,44 @@ fn bug_closest_points_on_parallel_features_lay_outside_their_shapes() {
         assert_eq!(wrong, None, "{a:?} {b:?} {c:?}");
     }
 }
+
+/// As boxes and as hulls of their corners.
+#[test]
+fn bug_overlapping_boxes_nearly_in_line_had_an_interval_ten_times_too_wide() {
+    let corners = |half: &Vec3| {
+        let cells =
+            (0..8_u32).map(|k| Vec3::from_fn(|axis, _| f64::from(k >> axis & 1) * 2.0 - 1.0));
+        Solid::Points(cells.map(|side| side.component_mul(half)).collect())
+    };
+    let (one, other) = (Vec3::new(0.5, 0.4, 0.3), Vec3::new(0.3, 0.5, 0.4));
+    let mut r = Random(23);
+    for number in 0..4_000 {
+        let tilt = 10.0_f64.powf(r.range(-12.0, -3.0));
+        let lean = match number % 4 {
+            0 => Vec3::new(3.0, 2.0, 1.0).normalize(),
+            1 => Vec3::ith(r.below(3) as usize, 1.0),
+            _ => r.direction(),
+        };
+        let mut at = Vec3::new(0.1, 0.05, 0.65);
+        if number % 3 > 0 {
+            // Rather two edges than two faces.
+            let depth = r.range(1e-9, 0.1);
+            at = Vec3::new(
+                r.range(-0.3, 0.3),
+                0.9 - depth,
+                0.7 - depth * r.range(0.9, 1.1),
+            );
+        }
+        let pose = Pose::from_parts(at.into(), UnitQuaternion::from_scaled_axis(lean * tilt));
+        let (a, b) = (Solid::Cuboid(one), Solid::Cuboid(other));
+        let boxes = convex_gap(&a.build(), &b.build(), &pose, &mut Warm::default());
+        let (hull_a, hull_b) = (corners(&one).build(), corners(&other).build());
+        let hulls = convex_gap(&hull_a, &hull_b, &pose, &mut Warm::default());
+        let what = format!("{number}, tilt {tilt}: {boxes:?} {hulls:?}");
+        assert!(boxes.gap.max - boxes.gap.min < 1e-11, "{what}");
+        assert!(boxes.finished && boxes.gap.max >= hulls.gap.min, "{what}");
+        assert!(boxes.gap.min <= hulls.gap.max, "{what}");
+        let (_, wrong) = check(&a, &b, &pose, &boxes, 12);
+        assert_eq!(wrong, None, "{what}");
+    }
+}

@@ -58,15 +58,22 @@ impl Measured {
     pub(super) fn told(&self) -> GapKnown {
         let finite = |end: f64| end.is_finite().then_some(end);
         let Interval { min, max } = self.gap;
+        // An estimate is never outside what is proved, and the points are as far apart as it says.
+        let best_m = self.best_m.and_then(|best| finite(best.max(min).min(max)));
+        let point_b = match (best_m, self.point_a, self.normal) {
+            (Some(best_m), Some(at), Some(normal)) if self.best_m != Some(best_m) => {
+                Some([0, 1, 2].map(|k| at[k] + normal[k] * best_m))
+            }
+            _ => self.point_b,
+        };
         GapKnown {
             verdict: self.verdict.code(),
             touching: self.touching,
             gap_min_m: finite(min),
             gap_max_m: finite(max),
-            // An estimate is never outside the proved interval.
-            gap_best_m: self.best_m.and_then(|best| finite(best.max(min).min(max))),
+            gap_best_m: best_m,
             point_a: self.point_a,
-            point_b: self.point_b,
+            point_b,
             normal: self.normal,
         }
     }
@@ -200,5 +207,15 @@ mod tests {
             assert_eq!(known.told().gap_best_m, told);
         }
         assert_eq!(measured(f64::NEG_INFINITY, 1.0, 0.0).told().gap_min_m, None);
+        // bug: the points stayed where the estimate had been.
+        for (min, max, told) in [(1.0, 2.0, 7.0), (0.25, 2.0, 6.5), (0.125, 0.25, 6.25)] {
+            let known = Measured {
+                point_a: Some([1.0, 6.0, 2.0]),
+                point_b: Some([1.0, 6.5, 2.0]),
+                normal: Some([0.0, 1.0, 0.0]),
+                ..measured(min, max, 0.5)
+            };
+            assert_eq!(known.told().point_b, Some([1.0, told, 2.0]));
+        }
     }
 }

@@ -17,7 +17,7 @@ mod spec;
 pub use build::{Built, build};
 pub(crate) use check::spread;
 pub use convex::Convex;
-pub(crate) use convex::Core;
+pub(crate) use convex::{Core, RING_MAX};
 pub use error::ShapeError;
 pub use files::Contents;
 pub use library::Library;

@@ -4,10 +4,11 @@
 
 use super::pair::Pair;
 use crate::math::{Pose, Vec3, across_z};
-use crate::shape::Core;
+use crate::shape::{Core, RING_MAX};
 
-/// Most corners of one feature; hull faces with more are thinned out (a manifold keeps four points anyway).
-pub(super) const CORNERS_MAX: usize = 8;
+/// Most corners of one feature; hull faces with more keep those that span most of them (a manifold keeps four points
+/// anyway).
+pub(super) const CORNERS_MAX: usize = RING_MAX;
 
 /// See [`Feature::spread`].
 pub(super) const RIM: f64 = 1e-9;
@@ -151,9 +152,7 @@ impl Feature {
                 let best = faces.max_by(|x, y| x.normal.dot(dir).total_cmp(&y.normal.dot(dir)));
                 match best {
                     Some(face) => {
-                        let corners = hull.corners(face);
-                        let step = corners.len().div_ceil(CORNERS_MAX).max(1);
-                        for &place in corners.iter().step_by(step) {
+                        for &place in hull.ring(face) {
                             if let Some(corner) = hull.points().get(place as usize) {
                                 self.push(*corner, place);
                             }

@@ -67,13 +67,19 @@ pub(super) fn gap(
     let Interval { min, max } = asked.gap;
     let collides = asked.verdict == Verdict::Colliding;
     Ok(Some(if let Some(witness) = asked.witness {
+        // An estimate is never outside what is proved, and the points are as far apart as it says.
+        let best_m = witness.best_m.max(min).min(max);
+        let point_b = if (min..=max).contains(&witness.best_m) {
+            pos12 * witness.point_b
+        } else {
+            witness.point_a + witness.normal * best_m
+        };
         Known {
             gap: asked.gap,
-            // An estimate is never outside the proved interval.
-            best_m: Some(witness.best_m.max(min).min(max)),
+            best_m: Some(best_m),
             normal: witness.normal,
             point_a: witness.point_a,
-            point_b: pos12 * witness.point_b,
+            point_b,
             collides,
         }
     } else {

@@ -3,24 +3,20 @@
 //! In: points, own frame, metres. Out: a [`Hull`] that is exactly the hull of the points: only points proved to lie
 //! within the others are left out, and nothing is moved.
 
-use super::facets::{Facet, corners_of, facets_of, is_exact};
+use super::faces::{self, RING_MAX, Thick};
+use super::facets::{corners_of, facets_of, is_exact};
 use super::flat;
 use crate::limits::{EXTENT_MAX_M, HULL_VERTICES_MAX};
 use crate::math::{Point, Vec3};
 use crate::shape::ShapeError;
 use crate::shape::check::spread;
 
-/// Points this near to the plane of a large triangle belong to its face, as a share of the hull's size.
-const FACE_THICK: f64 = 1e-9;
-/// A triangle with less than twice this area has no normal, as a share of the size's square.
-const NO_AREA: f64 = 1e-12;
-
 /// A hull: its points, and its faces if they could be found.
 #[derive(Debug)]
 pub(crate) struct Hull {
     points: Vec<Vec3>,
     faces: Vec<HullFace>,
-    /// Corners of all faces, one run per face.
+    /// Corners of all faces, one run per face; behind each run longer than [`RING_MAX`] those that span most of it.
     corners: Vec<u32>,
 }
 
@@ -57,19 +53,18 @@ impl Hull {
     /// The hull of at least one point.
     pub(super) fn build(given: &[Point]) -> Result<Self, ShapeError> {
         let points = places(given)?;
-        let (_, size_m) = thickness(&points);
-        Self::of_places(&points, size_m)
+        let (thin_m, size_m) = thickness(&points);
+        Self::of_places(&points, &Thick::of(thin_m, size_m))
     }
 
     /// The hull of points that span a volume.
     pub(super) fn build_solid(given: &[Point]) -> Result<Self, ShapeError> {
         let points = places(given)?;
-        let size_m = check_volume(&points)?;
-        Self::of_places(&points, size_m)
+        let (thin_m, size_m) = check_volume(&points)?;
+        Self::of_places(&points, &Thick::of(thin_m, size_m))
     }
 
-    /// * `size_m` - the points' greatest extent.
-    fn of_places(points: &[Point], size_m: f64) -> Result<Self, ShapeError> {
+    fn of_places(points: &[Point], thick: &Thick) -> Result<Self, ShapeError> {
         let facets = facets_of(points).unwrap_or_default();
         let is_corner = match facets[..] {
             // Without a surface every query works, and manifolds have one point.
@@ -95,7 +90,7 @@ impl Hull {
             faces: Vec::new(),
             corners: Vec::new(),
         };
-        for (normal, corners) in faces_of(points, &facets, size_m) {
+        for (normal, corners) in faces::of(points, &facets, thick) {
             let named = corners.into_iter().map(|k| new_place[k as usize]);
             hull.push_face(normal, named.filter(|k| *k != u32::MAX).collect());
         }
@@ -116,6 +111,16 @@ impl Hull {
         self.corners
             .get(first..first + face.count as usize)
             .unwrap_or(&[])
+    }
+
+    /// At most [`RING_MAX`] of a face's corners, counter-clockwise seen from outside: those that span most of it.
+    pub(crate) fn ring(&self, face: &HullFace) -> &[u32] {
+        let count = face.count as usize;
+        if count <= RING_MAX {
+            return self.corners(face);
+        }
+        let first = face.first as usize + count;
+        self.corners.get(first..first + RING_MAX).unwrap_or(&[])
     }
 
     #[inline]
@@ -140,13 +145,17 @@ impl Hull {
         if corners.len() < 3 {
             return;
         }
-        order_around(&self.points, &normal, &mut corners);
+        faces::order_around(&self.points, &normal, &mut corners);
         #[allow(
             clippy::cast_possible_truncation,
             reason = "at most a few HULL_VERTICES_MAX"
         )]
         let (first, count) = (self.corners.len() as u32, corners.len() as u32);
-        self.corners.extend(corners);
+        self.corners.extend(&corners);
+        if corners.len() > RING_MAX {
+            faces::thin(&self.points, &normal, &mut corners);
+            self.corners.extend(corners);
+        }
         self.faces.push(HullFace {
             normal,
             first,
@@ -179,8 +188,8 @@ fn places(given: &[Point]) -> Result<Vec<Point>, ShapeError> {
     Ok(points)
 }
 
-/// Refuses points that span no volume; returns their greatest extent, metres.
-fn check_volume(points: &[Point]) -> Result<f64, ShapeError> {
+/// Refuses points that span no volume; else their [`thickness`].
+fn check_volume(points: &[Point]) -> Result<(f64, f64), ShapeError> {
     if points.len() < 4 {
         return Err(ShapeError::TooFewPoints {
             given: points.len(),
@@ -190,7 +199,7 @@ fn check_volume(points: &[Point]) -> Result<f64, ShapeError> {
     if thickness_m <= 1e-13 * size_m {
         return Err(ShapeError::FlatHull { thickness_m });
     }
-    Ok(size_m)
+    Ok((thickness_m, size_m))
 }
 
 /// Greatest distance of a point from the plane of a large triangle of points, and the greatest extent: both 0 for a
@@ -213,73 +222,6 @@ fn thickness(points: &[Point]) -> (f64, f64) {
     }
     let fourth = far(&|p| normal.dot(&(p - first)).abs());
     (normal.dot(&(fourth - first)).abs() / length, along.norm())
-}
-
-/// Plane faces: adjacent facets that lie in the plane of the largest of them. Outward normal, and corners in any order,
-/// including some that lie on the face's edges.
-fn faces_of(points: &[Point], facets: &[Facet], size_m: f64) -> Vec<(Vec3, Vec<u32>)> {
-    let across = |facet: usize| {
-        let [a, b, c] = facets[facet].corners.map(|k| points[k as usize]);
-        (b - a).cross(&(c - a))
-    };
-    let mut largest: Vec<(f64, usize)> = (0..facets.len())
-        .map(|facet| (across(facet).norm(), facet))
-        .filter(|(area, _)| *area > NO_AREA * size_m * size_m)
-        .collect();
-    largest.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
-    let mut face_of = vec![usize::MAX; facets.len()];
-    let mut faces = Vec::new();
-    for (area, seed) in largest {
-        if face_of[seed] != usize::MAX {
-            continue;
-        }
-        let normal = across(seed) / area;
-        let from = points[facets[seed].corners[0] as usize];
-        let is_near =
-            |k: u32| normal.dot(&(points[k as usize] - from)).abs() <= FACE_THICK * size_m;
-        face_of[seed] = faces.len();
-        let (mut all, mut done) = (vec![seed], 0);
-        while let Some(&at) = all.get(done) {
-            done += 1;
-            for other in facets[at].beside.map(|other| other as usize) {
-                let is_free = face_of[other] == usize::MAX;
-                if is_free
-                    && facets[other].corners.into_iter().all(is_near)
-                    && across(other).dot(&normal) >= 0.0
-                {
-                    face_of[other] = faces.len();
-                    all.push(other);
-                }
-            }
-        }
-        // A point that no other face meets is inside this one.
-        let face = faces.len();
-        let mut corners: Vec<u32> = Vec::new();
-        for facet in all.into_iter().map(|facet| &facets[facet]) {
-            let sides = (0..3).filter(|&k| face_of[facet.beside[k] as usize] != face);
-            corners.extend(sides.flat_map(|k| [facet.corners[k], facet.corners[(k + 1) % 3]]));
-        }
-        corners.sort_unstable();
-        corners.dedup();
-        faces.push((normal, corners));
-    }
-    faces
-}
-
-/// Sorts corners of a convex face counter-clockwise about its normal.
-fn order_around(points: &[Vec3], normal: &Vec3, corners: &mut [u32]) {
-    let at = |k: u32| points[k as usize];
-    let Some(&first) = corners.first() else {
-        return;
-    };
-    let middle: Vec3 = corners.iter().map(|&k| at(k)).sum::<Vec3>() / corners.len() as f64;
-    let x = at(first) - middle;
-    let y = normal.cross(&x);
-    let angle = |k: u32| {
-        let p = at(k) - middle;
-        p.dot(&y).atan2(p.dot(&x))
-    };
-    corners.sort_by(|&a, &b| angle(a).total_cmp(&angle(b)).then(a.cmp(&b)));
 }
 
 #[cfg(test)]

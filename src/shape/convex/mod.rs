@@ -5,6 +5,7 @@
 //! point and a capsule a segment.
 
 mod bounds;
+mod faces;
 mod facets;
 mod flat;
 mod hull;
@@ -15,6 +16,7 @@ use crate::math::{Point, Vec3, across_z};
 use crate::shape::ShapeError;
 use crate::shape::check::extent;
 
+pub(crate) use faces::RING_MAX;
 pub(crate) use hull::Hull;
 
 /// A convex solid, or a triangle.
