@@ -77,3 +77,13 @@ fn cell(x: f64) -> (usize, f64) {
 
 // Coordinates of the grid are exact.
 const _: () = assert!(CELLS.is_power_of_two());
+
+/// Greatest distance of a named vertex from the centre, rounded up.
+pub(super) fn radius(vertices: &[Point], faces: &[[u32; 3]], centre: &Point) -> f64 {
+    let square = faces
+        .iter()
+        .flatten()
+        .map(|&v| (vertices[v as usize] - centre).norm_squared())
+        .fold(0.0, f64::max);
+    square.sqrt() * (1.0 + 8.0 * ROUND)
+}
