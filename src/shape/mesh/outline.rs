@@ -8,7 +8,7 @@
 //! weights are bilinear in the grid's cell. Along the axes of the mesh the bound is exact; for a sphere it is at most
 //! 0.4 % too large.
 
-use crate::math::{Vec3, f32_up};
+use crate::math::{Point, ROUND, Vec3, f32_up};
 
 /// Cells along a side of a cube face: the error falls with the square. 16 make 7 kB a mesh.
 const CELLS: usize = 16;
