@@ -452,6 +452,15 @@ fn a_flat_hull_and_odd_sizes_are_told_when_they_are_built() {
 }
 
 #[test]
+fn bug_a_scene_that_begins_with_a_mark_of_utf_8_is_read() {
+    let scene = |text: &str| Scene::parse(text, "a.toml", Path::new("")).unwrap();
+    assert_eq!(
+        scene(&format!("\u{feff}{}", ball("a", ""))).bodies[0].name,
+        "a"
+    );
+}
+
+#[test]
 fn odd_but_legal_things_are_notes() {
     let notes = |text: &str| Scene::parse(text, "a.toml", Path::new("")).unwrap().notes();
     assert!(notes("")[0].contains("no body"));
@@ -469,7 +478,14 @@ fn odd_but_legal_things_are_notes() {
     let two = format!(
         "[[body]]\nname = \"a\"\nmoves = false\n{plane}\n[[body]]\nname = \"b\"\nmoves = false\n{plane}\n"
     );
-    assert!(notes(&two)[0].contains("two half-spaces are never paired"));
+    assert!(notes(&two)[0].ends_with("two half-spaces are never paired"));
+    let more = two.replacen(
+        plane,
+        "shape = [{ type = \"half_space\", normal = [0, 0, 1] }, { type = \"sphere\", radius = 1.0 }]",
+        1,
+    );
+    let more = notes(&more);
+    assert!(more[0].contains("have half-spaces") && more[0].ends_with("their other shapes are"));
     let rule = "[[source]]\nname = \"s\"\n[[rule]]\naction = \"ignore\"\na = \"x*\"\nb = \"b\"\n"
         .to_owned()
         + &ball("b", "");

@@ -20,13 +20,9 @@ pub(super) fn update(
     let touches = |key: PairKey| {
         let (low, high) = key.slots();
         let without = [low, high].map(|slot| members.has(slot, UNBOUNDED));
-        match without {
-            [true, true] => false,
-            [false, false] => {
-                judge.forced.has(key) || proxies.aabb(low).overlaps(proxies.aabb(high))
-            }
-            _ => true,
-        }
+        without.contains(&true)
+            || judge.forced.has(key)
+            || proxies.aabb(low).overlaps(proxies.aabb(high))
     };
     let mut slots = std::mem::take(&mut found.slots);
     slots.clear();
@@ -49,7 +45,7 @@ pub(super) fn update(
     for (at, a) in all().enumerate() {
         for b in all().skip(at + 1) {
             let key = PairKey::new(*a, *b);
-            if touches(key) {
+            if touches(key) && judge.may_be(key) {
                 found.began.push(key);
             }
         }

@@ -70,11 +70,15 @@ impl<'a, X: Proxies, P: PairPolicy> Judge<'a, X, P> {
         let (low, high) = key.slots();
         let one = self.members.has(low, UNBOUNDED);
         let other = self.members.has(high, UNBOUNDED);
-        if one || other {
-            !(one && other)
-        } else {
-            self.forced.has(key)
-        }
+        one || other || self.forced.has(key)
+    }
+
+    /// Returns whether two bodies are worth a suggestion. Most that have no boxes are half-spaces and nothing else, and
+    /// make no pairs: of many, these would fill the lists.
+    pub(super) fn may_be(&self, key: PairKey) -> bool {
+        let (low, high) = key.slots();
+        let without = self.members.has(low, UNBOUNDED) && self.members.has(high, UNBOUNDED);
+        !without || self.policy.allows(low, high)
     }
 
     /// Returns whether both bodies are in.

@@ -51,12 +51,14 @@ pub(super) fn begin(judge: &Judge<'_, impl Proxies, impl PairPolicy>, found: &mu
             continue;
         }
         found.maybe.extend(judge.forced.of(*slot));
-        let others = if members.has(*slot, UNBOUNDED) {
-            members.bounded()
-        } else {
-            members.unbounded()
-        };
-        let keys = others.iter().map(|other| PairKey::new(*slot, *other));
+        let key = |other: &BodySlot| PairKey::new(*slot, *other);
+        if !members.has(*slot, UNBOUNDED) {
+            found.maybe.extend(members.unbounded().iter().map(key));
+            continue;
+        }
+        found.maybe.extend(members.bounded().iter().map(key));
+        let others = members.unbounded().iter().filter(|other| *other != slot);
+        let keys = others.map(key).filter(|key| judge.may_be(*key));
         found.maybe.extend(keys);
     }
 }

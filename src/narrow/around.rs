@@ -1,6 +1,6 @@
 //! Bounds on the gap of two bodies from their bounding boxes and balls: what holds before any work is done.
 
-use crate::math::Interval;
+use crate::math::{Interval, ROUND};
 use crate::world::Body;
 
 /// Bounds on the gap of two bodies from their boxes (or a half-space's plane) alone.
@@ -35,6 +35,19 @@ pub(super) fn whole_bounds(a: &Body, b: &Body) -> Interval {
         min: (between - radii - rounding).next_down(),
         max: (between + radii + rounding).next_up(),
     }
+}
+
+/// Radii of the balls around two bodies; where both have half-spaces, around their other shapes alone. Metres, about
+/// their centres; infinite where there is nothing but half-spaces.
+pub(super) fn radii_m(a: &Body, b: &Body) -> [f64; 2] {
+    if !(a.unbounded && b.unbounded) {
+        return [a.radius, b.radius];
+    }
+    // The centre of a body that has a half-space is its origin.
+    [a, b].map(|body| match body.shapes.tree() {
+        Some(tree) if tree.boxes.is_some() => tree.reach_m * (1.0 + 8.0 * ROUND),
+        _ => f64::INFINITY,
+    })
 }
 
 /// Distance of the centres of two bodies, and the error bound of it and of its sums with their radii, metres.

@@ -39,11 +39,12 @@ pub struct Asked {
 /// * `report_m` - pairs nearer than this are `near`, metres.
 /// * `meter` - if it closes, the answer is what is known by then.
 ///
-/// Two bodies that have half-spaces have no gap (law 3.2): their interval stays unknown.
+/// Two half-spaces have no gap (law 3.2): the interval of two bodies of nothing else stays unknown, and of others it is
+/// that of their other pairs of shapes.
 #[must_use]
 pub fn gap_between(a: &Body, b: &Body, report_m: f64, meter: &mut Meter<'_>) -> Asked {
     let found = match (&*a.shapes, &*b.shapes) {
-        _ if a.unbounded && b.unbounded => Told::NOTHING,
+        _ if a.only_half_spaces && b.only_half_spaces => Told::NOTHING,
         ([one], [other]) => of_shapes((a, b), (one, other), report_m, meter),
         _ => of_parts((a, b), report_m, meter),
     };

@@ -4,6 +4,7 @@ use crate::math::{Point, Pose, ROUND, Vec3, chord, displacement};
 use crate::shape::Geometry;
 use crate::world::Body;
 
+use super::around::radii_m;
 use super::bent::Bent;
 
 /// An upper bound on how much the gap of two bodies changed since a test, from their relative pose and deformation at
@@ -30,6 +31,9 @@ pub(super) fn changed_since(a: &Body, b: &Body, (then, bent): (&Pose, Bent), now
 /// under the surface of a solid of A comes nearer to that surface by `d` at most. And a ball of radius `r` within a
 /// solid of B about a point of A moves to a ball about a point within `d` of that one, so it still holds a ball of
 /// radius `r - d` about it. The motion of A's own points seen from B is not used: far out it has no bound.
+///
+/// If both bodies have half-spaces, these are not paired with each other (law 3.2). In every other pair at least one
+/// shape is bounded, and the above holds for it: the greater displacement of the two bodies' bounded shapes.
 pub(super) fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f64 {
     if then == now {
         return 0.0;
@@ -41,6 +45,9 @@ pub(super) fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f6
             displacement(then, now, &b.centre, b.radius)
         };
     }
+    if a.unbounded && b.unbounded {
+        return of_bounded_shapes(a, b, then, now);
+    }
     match (half_space_of(a), half_space_of(b)) {
         (Some(normal), _) => plane_motion(&normal, then, now, &b.centre, b.radius),
         (None, Some(normal)) => plane_motion(
@@ -51,11 +58,21 @@ pub(super) fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f6
             a.radius,
         ),
         (None, None) if !b.unbounded => displacement(then, now, &b.centre, b.radius),
-        (None, None) if !a.unbounded => {
-            displacement(&then.inverse(), &now.inverse(), &a.centre, a.radius)
-        }
-        // Two bodies that both have half-spaces are never a pair.
-        (None, None) => f64::INFINITY,
+        (None, None) => displacement(&then.inverse(), &now.inverse(), &a.centre, a.radius),
+    }
+}
+
+/// The greatest displacement of a bounded shape of one of two bodies, seen from the other.
+fn of_bounded_shapes(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f64 {
+    let [of_a, of_b] = radii_m(a, b);
+    let by_b = displacement(then, now, &b.centre, of_b);
+    let by_a = displacement(&then.inverse(), &now.inverse(), &a.centre, of_a);
+    match (of_a.is_finite(), of_b.is_finite()) {
+        (true, true) => by_a.max(by_b),
+        (true, false) => by_a,
+        (false, true) => by_b,
+        // Bodies of half-spaces alone are no pair.
+        (false, false) => f64::INFINITY,
     }
 }
 

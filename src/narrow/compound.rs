@@ -10,7 +10,8 @@
 //!
 //! The search orders are those of two meshes: depth first, deepest overlap first, for a verdict; best first for bounds;
 //! depth first to the end for the contact set. Half-spaces fit into no box: each is a root of its own (`side`). Two
-//! bodies that both have one have no gap (law 3.2) and are no pair (`world/filters`).
+//! half-spaces have no gap (law 3.2): their pairs are left out (`roots`), and bodies of nothing else are no pair
+//! (`world/filters`).
 //!
 //! Refused: one tree of all triangles of all shapes of a body (shapes are shared between bodies, and a solid's inside
 //! and a convex shape's depth belong to the shape); testing all pairs of shapes (65,536 of each are allowed).
@@ -32,6 +33,7 @@ use crate::time::Meter;
 use crate::world::Body;
 
 use super::arena::Run;
+use super::around::radii_m;
 use super::bent::Bent;
 use super::change::relative_motion;
 use super::cover::{Cover, Group, Open, Wear};
@@ -41,7 +43,7 @@ use super::mesh::{CarriedFront, Goal, Placed, Search};
 use super::shelves::Shelves;
 
 use leaf::Inner;
-use side::{Side, children, gaps, placed};
+use side::{Side, children, gaps, placed, roots};
 
 /// The front of one pair of bodies; used with the same [`Tools`] from its start to its release.
 #[derive(Debug, Default)]
@@ -136,7 +138,7 @@ impl CompoundFront {
             self.bent = bent;
         }
         let entries = &tools.shelves.store.entries;
-        let worn = (self.wear).is_worn_out(&self.cover, entries, [a.radius, b.radius]);
+        let worn = (self.wear).is_worn_out(&self.cover, entries, radii_m(a, b));
         if worn || self.search != Search::Carried {
             self.start_over(tools, (&sides.0, &sides.1));
             return;
@@ -255,9 +257,7 @@ impl CompoundFront {
     /// Starts over from the roots, at the current pose.
     fn start_over(&mut self, tools: &mut Tools<'_>, (a, b): (&Side<'_>, &Side<'_>)) {
         let entries = &mut tools.shelves.store.entries;
-        let pairs_with = |of_a| b.roots().map(move |of_b| (of_a, of_b));
-        let roots = a.roots().flat_map(pairs_with);
-        (self.cover).start(entries, (&self.at.pos12, self.search), roots);
+        (self.cover).start(entries, (&self.at.pos12, self.search), roots(a, b));
         self.known = Known::default();
         self.found.clear();
         self.wear = Wear::default();

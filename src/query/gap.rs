@@ -25,7 +25,7 @@ impl GapQuestion {
     ///
     /// # Errors
     /// Why there is no gap, which body, and what to change: no such body, one of unknown place, the same one twice, two
-    /// that have half-spaces.
+    /// that are half-spaces and nothing else.
     pub fn new(
         world: &World,
         tick_header: MessageHeader,
@@ -99,9 +99,9 @@ pub(super) fn both<'w>(
     for (slot, body) in [(slot_a, one), (slot_b, other)] {
         warnings.extend(fit(world, slot, body)?);
     }
-    if one.unbounded && other.unbounded {
+    if one.only_half_spaces && other.only_half_spaces {
         return Err(format!(
-            "\"{a}\" and \"{b}\" both have a half-space, and two half-spaces have no gap: ask of bodies of which one at least is bounded"
+            "\"{a}\" and \"{b}\" are both half-spaces, and two half-spaces have no gap: ask of bodies of which one has another shape"
         ));
     }
     Ok(((slot_a, one), (slot_b, other), warnings))

@@ -134,7 +134,7 @@ impl TouchingQuestion {
                         world.filters().allows_stranger(*group, *mask, slot)
                     }
                 };
-                let is_apart_by_law = part.unbounded && other.unbounded;
+                let is_apart_by_law = part.only_half_spaces && other.only_half_spaces;
                 if is_apart_by_law || other.status == BodyStatus::Disabled || !by_filter() {
                     self.found.ignored += 1;
                     continue;

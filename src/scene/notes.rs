@@ -17,13 +17,22 @@ impl PairRule {
 }
 
 impl BodySpec {
-    /// Whether one of its shapes is a half-space: it has no box, and is paired with every bounded body.
+    /// Whether one of its shapes is a half-space: it has no box, and is paired with every body that is
+    /// not half-spaces alone.
     #[must_use]
     pub fn is_unbounded(&self) -> bool {
         let is_half_space = |shape: &ShapeSpec| matches!(shape, ShapeSpec::HalfSpace { .. });
         self.shapes
             .iter()
             .any(|placed| is_half_space(&placed.shape))
+    }
+
+    /// Whether some of its shapes are half-spaces and some are not.
+    fn is_half_space_and_more(&self) -> bool {
+        let is_half_space = |shape: &ShapeSpec| matches!(shape, ShapeSpec::HalfSpace { .. });
+        let others = self.shapes.iter();
+        let mut others = others.filter(|placed| !is_half_space(&placed.shape));
+        self.is_unbounded() && others.next().is_some()
     }
 }
 
@@ -49,25 +58,37 @@ impl Scene {
         }
         self.note_continuous(&mut notes);
         self.note_unread(&mut notes);
-        let unbounded: Vec<&str> = self
-            .bodies
-            .iter()
-            .filter(|body| body.is_unbounded())
-            .map(|body| body.name.as_str())
-            .collect();
-        if let [first, second, ..] = unbounded[..] {
-            notes.push(format!(
-                "{} bodies are half-spaces (\"{}\", \"{}\"{}): two half-spaces are never paired",
-                unbounded.len(),
-                shortened(first),
-                shortened(second),
-                if unbounded.len() > 2 { ", .." } else { "" }
-            ));
-        }
+        self.note_half_spaces(&mut notes);
         self.note_sources(&mut notes);
         self.note_rules(&mut notes);
         self.note_groups(&mut notes);
         notes
+    }
+
+    fn note_half_spaces(&self, notes: &mut Vec<String>) {
+        let unbounded = self.bodies.iter().filter(|body| body.is_unbounded());
+        let unbounded: Vec<&BodySpec> = unbounded.collect();
+        let [first, second, ..] = unbounded[..] else {
+            return;
+        };
+        let others = unbounded.iter().any(|body| body.is_half_space_and_more());
+        notes.push(format!(
+            "{} bodies {} (\"{}\", \"{}\"{}): two half-spaces are never paired{}",
+            unbounded.len(),
+            if others {
+                "have half-spaces"
+            } else {
+                "are half-spaces"
+            },
+            shortened(&first.name),
+            shortened(&second.name),
+            if unbounded.len() > 2 { ", .." } else { "" },
+            if others {
+                ", their other shapes are"
+            } else {
+                ""
+            }
+        ));
     }
 
     fn note_continuous(&self, notes: &mut Vec<String>) {

@@ -32,7 +32,7 @@ pub(crate) use tree::{Below, NODES_WAITING_MAX, Node};
 use adjacency::Adjacency;
 pub(crate) use balls::{Ball, Balls};
 use normals::Normals;
-use outline::Outline;
+use outline::{Outline, radius};
 use rings::Rings;
 use topology::Topology;
 pub(crate) use trails::Trails;
@@ -84,6 +84,7 @@ impl Mesh {
     ///
     /// A solid's shell of negative volume that is not wholly within another is turned round with all it contains, and a
     /// warning says so. Faces keep their indices; turned ones swap their last two corners.
+    /// Of a closed mesh that is written double-sided only one side is kept, unless `solid` is false; a warning says so.
     ///
     /// Cost: O(n log n); inside tests for shells of negative volume.
     ///
@@ -101,6 +102,13 @@ impl Mesh {
             return Err(ShapeError::EmptyMesh);
         }
         let mut warnings = Vec::new();
+        if solid != Some(false)
+            && topology.defects.duplicates > 0
+            && let Some(half) = topology.one_side(&vertices, &faces)
+        {
+            warnings.push(double_sided(faces.len() - half.0.len()));
+            (faces, topology) = half;
+        }
         let solid = settle(&mut topology, &vertices, &mut faces, solid, &mut warnings)?;
 
         let centre = bounds.centre();
@@ -380,14 +388,10 @@ fn settle(
     Ok(solid)
 }
 
-/// Greatest distance of a named vertex from the centre, rounded up.
-fn radius(vertices: &[Point], faces: &[[u32; 3]], centre: &Point) -> f64 {
-    let square = faces
-        .iter()
-        .flatten()
-        .map(|&v| (vertices[v as usize] - centre).norm_squared())
-        .fold(0.0, f64::max);
-    square.sqrt() * (1.0 + 8.0 * ROUND)
+fn double_sided(count: usize) -> String {
+    format!(
+        "{count} faces on the same corners as another face, the other way round, left out: what is left is closed"
+    )
 }
 
 #[cfg(test)]

@@ -25,6 +25,8 @@ pub struct Body {
     pub moves: bool,
     /// Whether one of its shapes is a half-space: no box, no motion accumulators.
     pub unbounded: bool,
+    /// Whether each of its shapes is one: with another such body it makes no pair.
+    pub only_half_spaces: bool,
     /// Last admitted pose, scene frame.
     pub pose: Pose,
     /// Velocity of that pose, if the sender gave it; for a body attached to another, as the other moves it.

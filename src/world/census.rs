@@ -9,7 +9,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::filters::{
-    Because, EXACT, Filters, Hot, LIVE, MOVES, NO_GROUP, SIDED, UNBOUNDED, are_neighbours,
+    Because, EXACT, Filters, HALF_SPACES, Hot, LIVE, MOVES, NO_GROUP, SIDED, are_neighbours,
     by_default_of_strangers, by_rule, never,
 };
 use super::names::{NameId, Names};
@@ -88,7 +88,7 @@ impl Filters {
                 continue;
             }
             let next = small(list.len());
-            let flags = hot.flags & (MOVES | UNBOUNDED);
+            let flags = hot.flags & (MOVES | HALF_SPACES);
             let (sided, place) = if hot.has(SIDED) {
                 let sided = self.rules.sided_of(hot.name);
                 (sided, *places.entry((sided, flags)).or_insert(next))

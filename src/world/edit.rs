@@ -9,7 +9,7 @@ use super::World;
 use super::edit_links::Places;
 use super::edit_rules::Uncounted;
 use super::edit_same::Touch;
-use super::filters::{ENABLED, Hot, LIVE, MOVES, NO_GROUP, UNBOUNDED};
+use super::filters::{ENABLED, HALF_SPACES, Hot, LIVE, MOVES, NO_GROUP};
 use super::names::NameId;
 use super::parts::Parts;
 use super::place::{Entry, new_body};
@@ -218,7 +218,7 @@ impl World {
             flags: LIVE
                 | flag(spec.enabled, ENABLED)
                 | flag(spec.moves, MOVES)
-                | flag(body.unbounded, UNBOUNDED),
+                | flag(body.only_half_spaces, HALF_SPACES),
             group: spec.group,
             mask: spec.mask,
             name,

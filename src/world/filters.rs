@@ -12,7 +12,8 @@ use crate::ids::{BodySlot, PairKey};
 pub(super) const LIVE: u16 = 1;
 pub(super) const ENABLED: u16 = 2;
 pub(super) const MOVES: u16 = 4;
-pub(super) const UNBOUNDED: u16 = 8;
+/// Each of its shapes is a half-space.
+pub(super) const HALF_SPACES: u16 = 8;
 pub(super) const KEEPS: u16 = 16;
 /// It keeps its pairs, and its box, which says nothing, makes no new ones.
 pub(super) const BARS: u16 = 128;
@@ -43,7 +44,7 @@ pub enum Because {
     MasksIgnore,
     /// Neither can move.
     CannotMove,
-    /// Both are half-spaces.
+    /// Both are half-spaces and nothing else.
     HalfSpaces,
     /// A body is disabled, or not there.
     Disabled,
@@ -273,7 +274,7 @@ pub(super) fn never(a: &Hot, b: &Hot) -> Option<Because> {
     if (a.flags | b.flags) & MOVES == 0 {
         return Some(Because::CannotMove);
     }
-    (a.flags & b.flags & UNBOUNDED != 0).then_some(Because::HalfSpaces)
+    (a.flags & b.flags & HALF_SPACES != 0).then_some(Because::HalfSpaces)
 }
 
 /// What a rule's word makes of a pair.

@@ -301,9 +301,9 @@ fn cause_of(status: BodyStatus) -> EndCause {
 
 /// A body at rest at its start pose, from what the scene says of it.
 pub(super) fn new_body(spec: &BodySpec, shapes: Parts, generation: u32) -> (Body, Aabb) {
-    let unbounded = shapes
-        .iter()
-        .any(|s| matches!(s.shape.geometry, Geometry::HalfSpace { .. }));
+    let is_half_space = |s: &PlacedShape| matches!(s.shape.geometry, Geometry::HalfSpace { .. });
+    let unbounded = shapes.iter().any(is_half_space);
+    let only_half_spaces = shapes.iter().all(is_half_space);
     let (centre, radius) = sphere_around(&shapes, unbounded);
     let tight = tight_box(&shapes, &spec.pose);
     // A half-space has no box and no ball about it: there is nothing to sweep.
@@ -321,6 +321,7 @@ pub(super) fn new_body(spec: &BodySpec, shapes: Parts, generation: u32) -> (Body
         shapes,
         moves: spec.moves,
         unbounded,
+        only_half_spaces,
         pose: spec.pose,
         velocity: None,
         centre,

@@ -3,7 +3,7 @@
 use super::World;
 use super::body::Body;
 use super::edit_rules::Uncounted;
-use super::filters::{BARS, ENABLED, KEEPS, LIVE, MOVES, UNBOUNDED};
+use super::filters::{BARS, ENABLED, HALF_SPACES, KEEPS, LIVE, MOVES};
 use super::tag::Tag;
 use crate::ids::BodySlot;
 use crate::wire::BodyStatus;
@@ -100,8 +100,8 @@ impl World {
             "the filters disagree on moves",
         )?;
         check(
-            hot.has(UNBOUNDED) == body.unbounded,
-            "the filters disagree on unbounded",
+            hot.has(HALF_SPACES) == body.only_half_spaces,
+            "the filters disagree on half-spaces",
         )?;
         let keeps = body.in_broad && body.reach_m.is_infinite();
         check(hot.has(KEEPS) == keeps, "the filters disagree on keeps")?;

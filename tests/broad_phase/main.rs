@@ -284,7 +284,7 @@ fn filter_edits_on_bodies_at_rest_find_and_end_pairs() {
 }
 
 #[test]
-fn unbounded_bodies_are_paired_with_all_but_one_another() {
+fn unbounded_bodies_are_paired_with_all_that_the_filters_allow() {
     let setup = |w: &mut World| {
         for i in 0..4 {
             w.bodies[i].unbounded = true;

@@ -46,11 +46,7 @@ fn ids(world: &World, (a, b): Pair) -> Ids {
 /// Whether something else than the boxes keeps it.
 fn always(world: &World, (a, b): Pair) -> bool {
     let key = PairKey::new(World::slot(a), World::slot(b));
-    match (world.bodies[a].unbounded, world.bodies[b].unbounded) {
-        (true, true) => false,
-        (false, false) => world.forced.contains(&key),
-        _ => true,
-    }
+    world.bodies[a].unbounded || world.bodies[b].unbounded || world.forced.contains(&key)
 }
 
 fn overlap(world: &World, (a, b): Pair) -> bool {

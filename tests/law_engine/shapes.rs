@@ -1,7 +1,8 @@
 //! 3.2, 3.3, 4.6: what once was said of meshes, half-spaces and height fields, through the engine.
 
 use sweepd::math::{Pose, Quat, Vec3, pose_from};
-use sweepd::time::Budget;
+use sweepd::narrow::gap_between;
+use sweepd::time::{Budget, Meter, SystemClock};
 use sweepd::wire::{State, Verdict, pair_flags};
 
 use crate::oracle::meshes::{self, trimesh};
@@ -44,6 +45,55 @@ fn law_4_6_a_half_space_turned_by_a_fifth_of_a_radian_sweeps_what_stands_far_fro
         assert_eq!(rig.verdict(1, 2), want);
         if budget == ALL {
             assert_eq!(rig.verdict(1, 3), Verdict::Apart);
+        }
+    }
+}
+
+/// Each is a half-space and a second shape.
+#[test]
+fn bug_two_bodies_with_half_spaces_never_met_though_their_other_shapes_did() {
+    let cube = trimesh(&meshes::cuboid(Vec3::repeat(0.5)), None);
+    let sphere = "{ type = \"sphere\", radius = 0.5 }";
+    let with = |id, up: i32, other: &str| {
+        let plane = format!("{{ type = \"half_space\", normal = [0, 0, {up}], offset = -5 }}");
+        body(id, [0.0; 3], &format!("[{plane}, {other}]"), "")
+    };
+    for (one, other) in [(sphere, sphere), (&*cube, sphere), (&*cube, &*cube)] {
+        for method in ["brute", "sap", "grid", "hash", "hgrid", "order"] {
+            let run = format!("[run]\nbroad_phase = \"{method}\"\n");
+            let mut rig = Rig::new(&scene(&run, &[with(1, 1, one), with(2, -1, other)]));
+            // Above the floor of the one and below the ceiling of the other, 3.5 m from both.
+            for (x, z, gap_m) in [
+                (3.0, 0.0, 2.0),
+                (3.1, 0.0, 2.1),
+                (0.5, 0.0, f64::NEG_INFINITY),
+                (9.0, 0.0, 4.5),
+                (9.0, -5.0, f64::NEG_INFINITY),
+                (9.0, -1.0, 3.5),
+                (3.0, 0.0, 2.0),
+            ] {
+                rig.row(1).position = [0.0; 3];
+                rig.row(2).position = [x, 0.0, z];
+                rig.send(ALL);
+                let place = format!("{method}, {one} and {other} at {x}, {z}");
+                if gap_m < 0.0 {
+                    assert_eq!(rig.state(), State::Colliding, "{place}");
+                    continue;
+                }
+                assert_eq!(rig.state(), State::Clear, "{place}");
+                let [a, b] = ["b1", "b2"].map(|name| {
+                    let world = rig.engine.world();
+                    world
+                        .slot_named(name)
+                        .and_then(|slot| world.body(slot))
+                        .unwrap()
+                });
+                let asked = gap_between(a, b, 0.0, &mut Meter::unlimited(&SystemClock));
+                let off_m = (asked.gap.min - gap_m)
+                    .abs()
+                    .max((asked.gap.max - gap_m).abs());
+                assert!(asked.finished && off_m < 1e-6, "{place}: {asked:?}");
+            }
         }
     }
 }

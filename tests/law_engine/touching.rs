@@ -106,7 +106,7 @@ fn by_force(world: &World, asked: &Body, but: &str, filters: bool) -> BTreeMap<S
     let others = world.bodies().filter(|(slot, _)| Some(*slot) != own);
     let checked = others.filter(|(slot, other)| match own {
         Some(own) => !filters || world.filters().allows(own, *slot),
-        None => !(asked.unbounded && other.unbounded),
+        None => !(asked.only_half_spaces && other.only_half_spaces),
     });
     let gap = |other: &Body| {
         let mut meter = Meter::unlimited(&SystemClock);

@@ -3,7 +3,7 @@
 
 use sweepd::ids::{BodySlot, PairKey};
 use sweepd::scene::{BodySpec, PairAction, PairRule, pattern_matches};
-use sweepd::world::{Because, Edit, Put, World};
+use sweepd::world::{Because, Edit, Parts, Put, World};
 
 use crate::support::{Bench, START_NS, cube, fixed, floor, moving, rule, scene};
 
@@ -188,6 +188,26 @@ fn law_3_2_two_half_spaces_are_never_paired() {
     assert_eq!(decide("floor", "a"), Because::CheckRule);
     assert!(world.body(slot("floor")).unwrap().unbounded);
     world.validate().unwrap();
+}
+
+#[test]
+fn bug_two_bodies_with_half_spaces_were_no_pair_though_they_had_other_shapes() {
+    let both = || Parts::from([floor()[0].clone(), cube()[0].clone()]);
+    let bodies = ["a", "b", "floor", "ramp", "c"].into_iter().zip(1..);
+    let bodies: Vec<BodySpec> = bodies.map(|(name, id)| moving(name, id)).collect();
+    let shapes = vec![both(), both(), floor(), floor(), cube()];
+    let rules = vec![rule(PairAction::Ignore, "*", "*")];
+    let world =
+        |rules| World::new(&scene(bodies.clone(), rules), shapes.clone(), START_NS).unwrap();
+    let free = world(Vec::new());
+    let slot = |name| free.slot_named(name).unwrap();
+    let decide = |a, b| free.filters().decide(slot(a), slot(b));
+    assert_eq!(decide("a", "b"), Because::Masks);
+    assert_eq!(decide("a", "floor"), Because::Masks);
+    assert_eq!(decide("ramp", "floor"), Because::HalfSpaces);
+    free.validate().unwrap();
+    // All pairs but that of the two half-spaces are ignored.
+    assert_eq!(world(rules).ignored_pairs_count(), 9);
 }
 
 #[test]

@@ -4,6 +4,7 @@ use crate::ids::PairSlot;
 use crate::limits::REGION_SHAPE_PAIRS_MAX;
 use crate::math::{Pose, ROUND, Vec3, relative};
 use crate::narrow::Narrow;
+use crate::narrow::around::radii_m;
 use crate::narrow::compound::PairWalk;
 use crate::narrow::contacts::Contact;
 use crate::narrow::mesh::{CarriedFront, PlaneScan, Scan, behind};
@@ -59,7 +60,8 @@ impl Narrow {
                     complete,
                 };
                 let front = self.front_at(slot, places);
-                self.collect_shapes(&pair, front, a.radius.min(b.radius), pace, approx);
+                let [of_a, of_b] = radii_m(a, b);
+                self.collect_shapes(&pair, front, of_a.min(of_b), pace, approx);
             }
         } else {
             approx.clipped = true;

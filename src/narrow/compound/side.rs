@@ -120,6 +120,17 @@ pub(super) fn placed(a: &Side<'_>, b: &Side<'_>, rel: &Pose) -> Placed {
     }
 }
 
+/// The pairs of boxes that all pairs of shapes are below, but for those of two half-spaces: they have no gap (law 3.2).
+pub(super) fn roots<'s>(a: &'s Side<'_>, b: &'s Side<'_>) -> impl Iterator<Item = (BoxId, BoxId)> {
+    a.roots().flat_map(move |of_a| {
+        let is_plane = a.plane(of_a).is_some();
+        let others = b
+            .roots()
+            .filter(move |of_b| !(is_plane && b.plane(*of_b).is_some()));
+        others.map(move |of_b| (of_a, of_b))
+    })
+}
+
 /// The box that is kept and the pack that replaces the other, for two boxes of which at least one is no leaf.
 pub(super) fn children((a, id_a): (&Side<'_>, BoxId), (b, id_b): (&Side<'_>, BoxId)) -> Group {
     let (held_a, held_b) = (a.held(id_a), b.held(id_b));

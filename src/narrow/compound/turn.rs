@@ -3,6 +3,7 @@
 use crate::ids::PairSlot;
 use crate::math::relative;
 use crate::narrow::Narrow;
+use crate::narrow::around::radii_m;
 use crate::narrow::carry::{CARRY_COST, Told, slice_units};
 use crate::narrow::mesh::Goal;
 use crate::time::Meter;
@@ -49,7 +50,8 @@ impl Narrow {
         if done && goal == Goal::Contacts {
             self.found.clear();
             (self.found).extend_from_slice(front.contacts(&self.shelves.contacts));
-            self.keep_contacts(slot, a.radius.min(b.radius), self.tick);
+            let [of_a, of_b] = radii_m(a, b);
+            self.keep_contacts(slot, of_a.min(of_b), self.tick);
         }
         !done
     }

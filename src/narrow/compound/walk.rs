@@ -6,7 +6,7 @@ use crate::narrow::mesh::Placed;
 use crate::shape::{BoxId, Held};
 use crate::world::Body;
 
-use super::side::{Side, children, gaps, placed};
+use super::side::{Side, children, gaps, placed, roots};
 
 /// Pairs of boxes that wait, each with a lower bound on its gap, metres; its memory is reused from walk to walk.
 #[derive(Debug, Default)]
@@ -29,10 +29,8 @@ impl<'a, 'w> PairWalk<'a, 'w> {
     ) -> Self {
         let (a, b) = (Side::of(a), Side::of(b));
         waiting.0.clear();
-        for of_a in a.roots() {
-            let pairs = b.roots().map(|of_b| (f64::NEG_INFINITY, of_a, of_b));
-            waiting.0.extend(pairs);
-        }
+        let pairs = roots(&a, &b).map(|(of_a, of_b)| (f64::NEG_INFINITY, of_a, of_b));
+        waiting.0.extend(pairs);
         let at = placed(&a, &b, rel);
         Self { a, b, at, waiting }
     }

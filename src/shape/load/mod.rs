@@ -161,8 +161,8 @@ pub(crate) fn load(path: &Path, bytes: &[u8], scale: Option<[f64; 3]>) -> Result
 fn parse(kind: Kind, bytes: &[u8]) -> Result<Soup, Flaw> {
     match kind {
         Kind::Stl => stl::parse(bytes),
-        Kind::Obj => obj::parse(bytes),
-        Kind::Dae => dae::parse(bytes),
+        Kind::Obj => obj::parse(unmarked(bytes)),
+        Kind::Dae => dae::parse(unmarked(bytes)),
     }
 }
 
@@ -286,6 +286,11 @@ fn finite(word: &str) -> Result<f64, String> {
 fn shown(word: &str) -> String {
     let head: String = word.chars().take(20).collect();
     head.escape_default().to_string()
+}
+
+/// The bytes behind the mark that some editors put in front of a text in UTF-8.
+fn unmarked(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
 }
 
 /// Lines with any line ending: LF, CR LF, or CR alone.

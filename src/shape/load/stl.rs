@@ -1,6 +1,6 @@
 //! STL, binary and text.
 
-use super::{Flaw, Soup, lines, number, shown};
+use super::{Flaw, Soup, lines, number, shown, unmarked};
 use crate::math::Point;
 
 /// Header and count of a binary file, bytes.
@@ -11,7 +11,7 @@ const TRIANGLE_BYTES: usize = 50;
 /// Number of triangles that a binary file claims; `None` for a text.
 pub(super) fn claimed(bytes: &[u8]) -> Option<u64> {
     let head = bytes.get(..84)?;
-    if is_text(head) {
+    if is_text(unmarked(head)) {
         return None;
     }
     let count: [u8; 4] = head[80..].try_into().ok()?;
@@ -52,8 +52,10 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Flaw> {
     // A header of plain text whose count and size agree is binary nevertheless.
     let raw_count = bytes.get(80..84).and_then(|b| <[u8; 4]>::try_from(b).ok());
     let is_binary = raw_count.is_some_and(|raw| fits(&u64::from(u32::from_le_bytes(raw))));
-    if !is_binary && is_text(bytes) {
-        return parse_text(bytes);
+    // The header of a binary file may hold any bytes, those of a mark too.
+    let text = unmarked(bytes);
+    if !is_binary && is_text(text) {
+        return parse_text(text);
     }
     let Some(raw) = raw_count else {
         return Err(Flaw::new(format!(

@@ -30,6 +30,45 @@ pub(super) fn volume(soup: &Soup) -> f64 {
     soup.faces.iter().map(of).sum()
 }
 
+/// Such a mark stands in front of what some editors save.
+#[test]
+fn bug_files_that_begin_with_a_mark_of_utf_8_were_refused() {
+    let marked = |text: &[u8]| [b"\xEF\xBB\xBF", text].concat();
+    for (kind, text) in [(Kind::Obj, OBJ), (Kind::Stl, STL_TEXT), (Kind::Dae, DAE)] {
+        let plain = ok(kind, text);
+        let soup = parse(kind, &marked(text.as_bytes())).unwrap();
+        assert_eq!((soup.vertices, soup.faces), (plain.vertices, plain.faces));
+    }
+    let long = format!("solid {}", "x".repeat(100));
+    assert_eq!(stl::claimed(&marked(long.as_bytes())), None);
+    // The header of a binary file is any 80 bytes.
+    let mut binary = STL.to_vec();
+    binary[..8].copy_from_slice(b"\xEF\xBB\xBFsolid");
+    assert_eq!(
+        parse(Kind::Stl, &binary).unwrap().vertices.len(),
+        parse(Kind::Stl, STL).unwrap().vertices.len()
+    );
+}
+
+/// Places from 1 count in the whole file.
+#[test]
+fn bug_an_obj_whose_faces_come_before_their_vertices_was_refused() {
+    let soup = ok(
+        Kind::Obj,
+        "v 0 0 0\nf 1 2 3 4\nv 1 0 0\nv 1 1 0\nf 1 -2 -1\nv 0 1 0\nf 1 2 4\n",
+    );
+    assert_eq!(soup.faces, [[0, 1, 2], [0, 2, 3], [0, 1, 2], [0, 1, 3]]);
+    let (line, text) = refused(Kind::Obj, "v 0 0 0\nf 1 2 9\nv 1 0 0\n\nf 1 2 7\n");
+    assert_eq!(line, 2);
+    assert!(
+        text.contains("names vertex \"9\", but the file has 2"),
+        "{text}"
+    );
+    let (line, text) = refused(Kind::Obj, "v 0 0 0\nf 1 2 3\nf 1 1 -2\nv 1 0 0\nv 1 1 0\n");
+    assert_eq!(line, 3);
+    assert!(text.contains("\"-2\", but 1 came before"), "{text}");
+}
+
 #[test]
 fn an_obj_has_negative_places_long_lines_and_polygons() {
     let soup = ok(
@@ -45,7 +84,7 @@ fn an_obj_has_negative_places_long_lines_and_polygons() {
         (
             "v 0 0 0\nf 1 1 2\n",
             2,
-            "names vertex \"2\", but 1 came before",
+            "names vertex \"2\", but the file has 1",
         ),
         ("v 0 0 0\nf 0 1 1\n", 2, "names vertex \"0\""),
         ("v 0 0 0\nf -2 1 1\n", 2, "names vertex \"-2\""),

@@ -8,7 +8,7 @@
 //! bilinear in the grid's cell. Along the axes of the mesh the bound is exact; for a sphere it is at most 0.4 % too
 //! large.
 
-use crate::math::{Vec3, f32_up};
+use crate::math::{Point, ROUND, Vec3, f32_up};
 
 /// Cells along a side of a cube face: the error falls with their square. 16 make 7 kB a mesh.
 const CELLS: usize = 16;
@@ -77,3 +77,13 @@ fn cell(x: f64) -> (usize, f64) {
 
 // Coordinates of the grid are exact.
 const _: () = assert!(CELLS.is_power_of_two());
+
+/// Greatest distance of a named vertex from the centre, rounded up.
+pub(super) fn radius(vertices: &[Point], faces: &[[u32; 3]], centre: &Point) -> f64 {
+    let square = faces
+        .iter()
+        .flatten()
+        .map(|&v| (vertices[v as usize] - centre).norm_squared())
+        .fold(0.0, f64::max);
+    square.sqrt() * (1.0 + 8.0 * ROUND)
+}

@@ -112,6 +112,70 @@ fn odd_faces_are_counted_and_bad_input_is_refused() {
     assert!(bad(vertices, faces).contains("vertex 2 is NaN"));
 }
 
+/// Some exporters write every face a second time the other way round. The edges cancelled, so such a box was a solid,
+/// but no point was inside.
+#[test]
+fn bug_a_double_sided_box_was_a_solid_without_an_inside() {
+    let (vertices, front) = cuboid([0.0; 3], 1.0, false);
+    let back = |face: &[u32; 3]| [face[0], face[2], face[1]];
+    let behind: Vec<[u32; 3]> = front
+        .iter()
+        .chain(&front.iter().map(back).collect::<Vec<_>>())
+        .copied()
+        .collect();
+    let beside: Vec<[u32; 3]> = front.iter().flat_map(|face| [*face, back(face)]).collect();
+    // Which of the two comes first, another from face to face.
+    let mixed: Vec<[u32; 3]> = beside
+        .chunks(2)
+        .zip(0..)
+        .flat_map(|(two, k)| {
+            if k % 3 == 0 {
+                [two[1], two[0]]
+            } else {
+                [two[0], two[1]]
+            }
+        })
+        .collect();
+    for faces in [behind, beside, mixed] {
+        for said in [None, Some(true)] {
+            let mesh = Mesh::new(vertices.clone(), faces.clone(), said).unwrap();
+            assert!(mesh.is_solid() && mesh.faces().len() == 12);
+            let volume: f64 = (0..12)
+                .map(|face| {
+                    let [a, b, c] = mesh.triangle(face).map(|p| p.coords);
+                    a.dot(&b.cross(&c)) / 6.0
+                })
+                .sum();
+            assert!((volume - 8.0).abs() < 1e-9, "{volume}");
+            assert!(says(&mesh, "12 faces on the same corners"));
+        }
+        let mesh = Mesh::new(vertices.clone(), faces, Some(false)).unwrap();
+        assert!(!mesh.is_solid() && mesh.faces().len() == 24);
+    }
+    // A wall that two boxes share stays: without it, neither is closed.
+    let (more, faces) = cuboid([2.0, 0.0, 0.0], 1.0, false);
+    let at = |p: &Point| vertices.iter().position(|q| q == p);
+    let mut both = vertices.clone();
+    let places: Vec<u32> = more
+        .iter()
+        .map(|p| {
+            let place = at(p).unwrap_or_else(|| {
+                both.push(*p);
+                both.len() - 1
+            });
+            u32::try_from(place).unwrap()
+        })
+        .collect();
+    let faces: Vec<[u32; 3]> = front
+        .iter()
+        .copied()
+        .chain(faces.iter().map(|face| face.map(|v| places[v as usize])))
+        .collect();
+    assert_eq!(both.len(), 12);
+    let mesh = Mesh::new(both, faces, None).unwrap();
+    assert!(mesh.is_solid() && mesh.faces().len() == 24);
+}
+
 #[test]
 fn the_box_at_a_pose_holds_every_vertex_and_touches_the_outermost() {
     let (vertices, faces) = cuboid([7.0, 1.0, -2.0], 0.5, false);

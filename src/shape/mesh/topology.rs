@@ -76,6 +76,28 @@ impl Topology {
         all
     }
 
+    /// One side of a mesh that is written double-sided, every face a second time the other way round, and its topology;
+    /// `None`: it is not, or one side alone is not closed. Such are a plate of no thickness, and boxes side by side
+    /// that share a wall.
+    ///
+    /// The file says both of each two faces, so either may be the one that is turned where they do not agree.
+    pub(super) fn one_side(
+        &self,
+        vertices: &[Point],
+        faces: &[[u32; 3]],
+    ) -> Option<(Vec<[u32; 3]>, Self)> {
+        let mut left = without_backs(faces);
+        if left.len() == faces.len() {
+            return None;
+        }
+        let mut topology = Self::new(vertices, &left);
+        if !topology.defects.closed() {
+            topology.orient(vertices, &mut left)?;
+            topology = Self::new(vertices, &left);
+        }
+        topology.defects.closed().then_some((left, topology))
+    }
+
     /// The uses of each edge: lesser and greater vertex, face, direction as read.
     pub(super) fn edge_uses(&self) -> impl Iterator<Item = &[EdgeUse]> {
         self.edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1))
@@ -200,6 +222,42 @@ impl Topology {
 fn volume(from: &Point, [a, b, c]: [Point; 3]) -> f64 {
     let (u, v, w): (Vec3, Vec3, Vec3) = (a - from, b - from, c - from);
     u.cross(&v).dot(&w) / 6.0
+}
+
+/// The faces, without the later one of each two on the same corners that face opposite ways.
+///
+/// Corners are vertices as given, not places: vertices in one place may part where a mesh deforms.
+fn without_backs(faces: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    let mut keyed: Vec<([u32; 3], usize, bool)> = Vec::with_capacity(faces.len());
+    for (place, &face) in faces.iter().enumerate() {
+        let mut corners = face;
+        corners.sort_unstable();
+        let [low, middle, high] = corners;
+        let is_turned = ![
+            [low, middle, high],
+            [middle, high, low],
+            [high, low, middle],
+        ]
+        .contains(&face);
+        keyed.push((corners, place, is_turned));
+    }
+    keyed.sort_unstable();
+    let mut is_gone = vec![false; faces.len()];
+    for same in keyed.chunk_by(|one, other| one.0 == other.0) {
+        // How many so far have no other side yet, by the way they face.
+        let mut alone = [0usize; 2];
+        for &(_, place, is_turned) in same {
+            let other = &mut alone[usize::from(!is_turned)];
+            if *other > 0 {
+                *other -= 1;
+                is_gone[place] = true;
+            } else {
+                alone[usize::from(is_turned)] += 1;
+            }
+        }
+    }
+    let kept = faces.iter().zip(&is_gone).filter(|(_, gone)| !**gone);
+    kept.map(|(face, _)| *face).collect()
 }
 
 /// For each vertex the first one in exactly the same place.
