@@ -74,14 +74,14 @@ fn two_bodies(mode: Mode) -> Scene {
 
 impl Daemon {
     fn of(mode: Mode) -> Self {
-        Self::of_scene(two_bodies(mode))
+        Self::of_scene(&two_bodies(mode))
     }
 
-    fn of_scene(scene: Scene) -> Self {
+    fn of_scene(scene: &Scene) -> Self {
         let shapes = scene.bodies.iter().map(|_| cube()).collect();
         Self {
             pacer: Pacer::new(&scene.config, &scene.sources).unwrap(),
-            world: World::new(&scene, shapes, START_NS).unwrap(),
+            world: World::new(scene, shapes, START_NS).unwrap(),
             clock: ManualClock::new(START_NS),
             drained: Inbox::default(),
             inbox: Inbox::default(),

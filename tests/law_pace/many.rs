@@ -57,7 +57,7 @@ fn put_bullet(daemon: &mut Daemon) {
 #[test]
 fn law_4_4_bug_a_partial_frame_of_a_source_that_does_not_lead_was_dropped_with_poses_no_later_one_has()
  {
-    let mut daemon = Daemon::of_scene(three());
+    let mut daemon = Daemon::of_scene(&three());
     daemon.run(2.0, vec![(1.0, robot(1)), (1.0, sim(1))]);
     let slow = partial(2, &[row(2, 7.0), row(5, 8.0)]);
     let mut frames = vec![(10.0, slow)];
@@ -86,7 +86,7 @@ fn law_4_4_bug_folded_frames_say_what_each_of_them_said() {
         frame
     };
     for (slow_speaks, fast_speaks) in [(true, true), (true, false), (false, true)] {
-        let mut daemon = Daemon::of_scene(three());
+        let mut daemon = Daemon::of_scene(&three());
         daemon.run(2.0, vec![(1.0, sim(1))]);
         let say = |frame, speaks: bool| {
             if speaks {
