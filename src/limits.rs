@@ -61,8 +61,8 @@ pub const VERTEX_FRAMES_WAITING_MAX: usize = 1024;
 /// Vertices of one source that wait for their tick, in all of its messages: as many as its queue in shared memory
 /// holds.
 pub const VERTEX_ROWS_WAITING_MAX: usize = 64 * DEFORMING_VERTICES_MAX;
-/// Frames of one source that wait for a scene revision, and as many that wait for their tick, where each makes one or is
-/// a part of a body's way; beyond it, and beyond `FRAME_ROWS_MAX` of all of them, the oldest go.
+/// Most frames of one source that wait for a scene revision, and most that wait for their tick if each makes one or is
+/// part of a body's path. Beyond it, and beyond `FRAME_ROWS_MAX` rows of all of them, the oldest are dropped.
 pub const FRAMES_WAITING_MAX: usize = 1024;
 /// Frames of one source that wait whatever their size is. Where they are parts of nothing, those beyond it are folded
 /// into one, or the oldest go; so they do of one that is to be refused, and of those that wait for the ROS 2 node.

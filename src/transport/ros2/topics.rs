@@ -19,8 +19,8 @@ const UNACKED_MAX: usize = 1 << 14;
 /// Lease of liveliness, offered where silence must be told: shorter ones flap, because the crate asserts once a second.
 const LEASE: Duration = Duration::from_secs(3);
 
-/// Between two tries of a reader for which DDS has no room yet, which empties a full queue in about that time. Each that
-/// fails is taken back through a queue of four, which may block for 20 ms.
+/// Time between two tries to open a reader for which DDS has no room yet; it empties a full queue in about that time.
+/// Each failed try is taken back through a queue of four, which may block for 20 ms.
 const AGAIN: Duration = Duration::from_millis(10);
 /// What DDS says of it. New readers wait for its thread in a queue of 100 (rustdds 0.15), and one more is refused at
 /// once; new writers wait until they are taken.
