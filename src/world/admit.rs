@@ -149,6 +149,7 @@ impl World {
                 state.pass_over_waiting();
             }
             state.note_gap(header);
+            state.cuts_next |= frame.cut;
             return Err(RejectReason::TooOld);
         }
         // An older frame that still waits has nothing to say any more, unless it may have bodies that this one lacks or
@@ -364,6 +365,7 @@ impl World {
                 self.take(source, &frame, times);
             } else {
                 state.note_gap(&frame.header);
+                state.cuts_next |= frame.cut;
                 state.refused += 1;
                 self.note_reject(RejectReason::SceneRevision, Some(source));
             }

@@ -114,7 +114,7 @@ impl World {
             };
             if body.moves {
                 self.forget_pose(slot);
-            } else {
+            } else if self.entries[index].enabled {
                 self.begin_anew(slot);
             }
         }

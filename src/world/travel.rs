@@ -192,8 +192,16 @@ impl World {
             if root.is_none_or(|root| root.source != Some(source)) {
                 continue;
             }
-            let body = self.bodies[slot.index()].as_mut();
-            if let Some(path) = body.and_then(|body| body.path.as_mut()) {
+            let entry = &self.entries[slot.index()];
+            // A disabled root has a path for what hangs on it. A body of which nobody knows where it is has none.
+            let carries = !entry.enabled && entry.has_pose;
+            let Some(body) = self.bodies[slot.index()].as_mut() else {
+                continue;
+            };
+            let takes_part = body.in_broad || carries;
+            if let Some(path) = body.path.as_mut()
+                && (takes_part || !path.is_empty())
+            {
                 if path.is_empty() {
                     self.travelled.push(slot);
                 }

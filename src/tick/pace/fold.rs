@@ -58,7 +58,13 @@ pub(super) fn fold(older: &Held, newer: &mut Held, ids: &mut Vec<u64>) -> bool {
     }
     let refused = old.refused_bodies.iter();
     let refused = refused.filter(|(body, _)| lacks(*body));
+    let own = new.refused_bodies.len();
     new.refused_bodies.extend(refused);
+    if new.refused_bodies.len() > own {
+        // Each body once, with the newer reason.
+        new.refused_bodies.sort_by_key(|(body, _)| *body);
+        new.refused_bodies.dedup_by_key(|(body, _)| *body);
+    }
     new.header.scene_rev = new.header.scene_rev.max(old.header.scene_rev);
     if old.header.flags == frame_flags::FULL {
         new.header.flags = frame_flags::FULL;

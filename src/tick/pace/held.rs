@@ -142,7 +142,7 @@ impl Queue {
                 return passed;
             }
             passed += 1;
-            if speaks && turn == Turn::Newest && self.fold_oldest(held) {
+            if speaks && turn == Turn::Newest && self.fold_two(held) {
                 continue;
             }
             // Without the one before it a pause renews nothing: it is what can be missed.
@@ -160,33 +160,54 @@ impl Queue {
         }
     }
 
-    /// Folds a frame of a source into the next one with poses, the oldest that can be; whether any could. Not into the
-    /// last of them: a pause renews the bodies of that one alone.
-    fn fold_oldest(&mut self, held: &Held) -> bool {
+    /// Folds a frame of a source into its next one with poses: of those that can be, the two with the fewest rows, so
+    /// that no row is copied often. Not into a frame that a pause follows, which renews the bodies of that one alone.
+    ///
+    /// * returns - whether any could.
+    fn fold_two(&mut self, held: &Held) -> bool {
         let has_poses = |other: &Held| {
             let whose = (other.whose.source, other.whose.speaks);
             whose == (held.whose.source, held.whose.speaks) && !other.is_pause()
         };
-        let last = self.frames.iter().rposition(has_poses);
-        let last = last.filter(|_| !has_poses(held));
+        let mut fewest: Option<(usize, usize, usize)> = None;
         let mut older: Option<usize> = None;
-        for at in 0..self.frames.len() {
-            if !has_poses(&self.frames[at]) || last == Some(at) {
+        for (at, new) in self.frames.iter().enumerate() {
+            if !has_poses(new) {
                 continue;
             }
-            if let Some(older) = older {
-                let (front, back) = self.frames.split_at_mut(at);
-                let (old, new) = (&front[older], &mut back[0]);
-                let (a, b) = (&old.frame.header, &new.frame.header);
-                let are_of_one = is_newer(new, old) && a.epoch == b.epoch;
-                if are_of_one && fold(old, new, &mut self.ids) {
-                    self.drop_at(older);
-                    return true;
+            if let Some(older) = older.replace(at) {
+                let old = &self.frames[older];
+                let rows = old.frame.transforms.len() + new.frame.transforms.len();
+                let are_of_one =
+                    is_newer(new, old) && old.frame.header.epoch == new.frame.header.epoch;
+                if are_of_one
+                    && is_sound(&old.frame)
+                    && is_sound(&new.frame)
+                    && !self.is_renewed(at, held)
+                    && fewest.is_none_or(|(least, ..)| rows < least)
+                {
+                    fewest = Some((rows, older, at));
                 }
             }
-            older = Some(at);
         }
-        false
+        let Some((_, older, at)) = fewest else {
+            return false;
+        };
+        let (front, back) = self.frames.split_at_mut(at);
+        let is_folded = fold(&front[older], &mut back[0], &mut self.ids);
+        if is_folded {
+            self.drop_at(older);
+        }
+        is_folded
+    }
+
+    /// Whether the next frame of the session behind this one is a pause.
+    fn is_renewed(&self, at: usize, held: &Held) -> bool {
+        let frame = &self.frames[at];
+        let mut behind = self.frames[at + 1..].iter().chain([held]);
+        behind
+            .find(|next| is_of_session(next, frame))
+            .is_some_and(Held::is_pause)
     }
 
     /// Hands out the frames that `wanted` picks, the oldest first.

@@ -139,7 +139,7 @@ impl Shelf {
     ///
     /// * `source` - place of its source in the scene; those of sources that it lacks, whose names anybody may make up,
     ///   count as one.
-    pub(super) fn put(&self, source: Option<usize>, frame: Frame) {
+    pub(super) fn put(&self, source: Option<usize>, mut frame: Frame) {
         let mut waiting = open(&self.waiting);
         let of_source = |(other, _): &(Option<usize>, Frame)| *other == source;
         if waiting.frames.iter().filter(|old| of_source(old)).count() >= FRAMES_PER_DRAIN_MAX
@@ -150,6 +150,8 @@ impl Shelf {
             let of_session = |next: &&mut (Option<usize>, Frame)| next.1.header.session == session;
             if let Some((_, next)) = waiting.frames.range_mut(at..).find(of_session) {
                 next.cut = true;
+            } else if frame.header.session == session {
+                frame.cut = true;
             }
             waiting.spare.push(oldest);
             self.passed_over.fetch_add(1, Ordering::Relaxed);
