@@ -42,7 +42,9 @@ impl End {
             let read_ns = clock.monotonic_ns();
             let ago_ns = clock.boottime_ns().saturating_sub(received_ns);
             let end_ns = read_ns.saturating_add(header.time_left_ns);
-            end_ns.saturating_sub(ago_ns)
+            // A receipt is a little behind the wake-up, from which the budget counts: that is never more than was left.
+            let most_ns = self.woke_ns.saturating_add(header.time_left_ns);
+            end_ns.saturating_sub(ago_ns).min(most_ns)
         });
         let earliest = [self.end_ns, own, left].into_iter().flatten().min();
         self.end_ns = earliest;

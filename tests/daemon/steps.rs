@@ -108,15 +108,10 @@ fn the_time_that_a_frame_leaves_bounds_the_work_of_its_tick() {
         (says(0, 1), says(0, hour_ns)),
     ] {
         let tick = tick_of(&late, touching);
-        // From receipt, which is a little behind the wake-up.
-        assert!(tick.budget_ns < SECOND_NS, "{} ns", tick.budget_ns);
+        assert!(tick.budget_ns <= 1, "{} ns", tick.budget_ns);
         assert_eq!((tick.units, tick.possible, tick.overrun), (0, 1, 1));
         let tick = tick_of(&enough, touching);
-        assert!(
-            tick.budget_ns < hour_ns + SECOND_NS,
-            "{} ns",
-            tick.budget_ns
-        );
+        assert!(tick.budget_ns <= hour_ns, "{} ns", tick.budget_ns);
         assert_eq!((tick.possible, tick.overrun), (0, 0));
         assert_eq!(tick_of(&FrameInfo::default(), apart).possible, 0);
         // Who says nothing has no end.
