@@ -84,7 +84,8 @@ impl Mesh {
     ///
     /// A solid's shell of negative volume that is not wholly within another is turned round with all it contains, and a
     /// warning says so. Faces keep their indices; turned ones swap their last two corners.
-    /// Of a closed mesh that is written double-sided only one side is kept, unless `solid` is false; a warning says so.
+    /// Of a closed mesh that is written double-sided only one side is kept, unless `solid` is false; a warning
+    /// says so, and faces count without the others.
     ///
     /// Cost: O(n log n); inside tests for shells of negative volume.
     ///

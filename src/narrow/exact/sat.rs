@@ -14,7 +14,7 @@ use crate::shape::Core;
 /// keeping it costs roundoff divided by the sine times the size. Both are equal here.
 const PARALLEL: f64 = 1e-8;
 /// If rounding leaves the overlap of nearly aligned boxes open by more than this, in units of what cannot be told from
-/// 0, a polytope decides. That takes longer, but such boxes are few: their edges are tilted by 1e-12 to 1e-4, and an
+/// 0, a polytope decides. That takes longer, but such boxes are few: their edges are tilted by 1e-12 to 1e-3, and an
 /// axis of two edges overlaps about as little as the least.
 const OPEN: f64 = 1024.0;
 /// A box shows a corner, not an edge, if every component of the normal in its frame exceeds this.

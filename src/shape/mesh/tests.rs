@@ -174,6 +174,18 @@ fn bug_a_double_sided_box_was_a_solid_without_an_inside() {
     assert_eq!(both.len(), 12);
     let mesh = Mesh::new(both, faces, None).unwrap();
     assert!(mesh.is_solid() && mesh.faces().len() == 24);
+    // So do both sides of a plug in a hole: without the one, the plug would be hollow.
+    let (mut block, outer) = cuboid([0.0; 3], 2.0, false);
+    let first = u32::try_from(block.len()).unwrap();
+    block.extend(&vertices);
+    let plug = front.iter().map(|face| face.map(|v| v + first));
+    let plug: Vec<[u32; 3]> = plug.collect();
+    let hole: Vec<[u32; 3]> = plug.iter().map(back).collect();
+    for inner in [[&hole, &plug], [&plug, &hole]] {
+        let faces = [&outer, inner[0], inner[1]].into_iter().flatten().copied();
+        let mesh = Mesh::new(block.clone(), faces.collect(), None).unwrap();
+        assert!(mesh.is_solid() && mesh.faces().len() == 36);
+    }
 }
 
 #[test]

@@ -87,7 +87,8 @@ impl Topology {
         faces: &[[u32; 3]],
     ) -> Option<(Vec<[u32; 3]>, Self)> {
         let mut left = without_backs(faces);
-        if left.len() == faces.len() {
+        // If only some are, a part may fill a hole of another, and both its sides count.
+        if 2 * left.len() != faces.len() {
             return None;
         }
         let mut topology = Self::new(vertices, &left);
