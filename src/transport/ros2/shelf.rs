@@ -147,11 +147,12 @@ impl Shelf {
             && let Some((_, oldest)) = waiting.frames.remove(at)
         {
             let session = oldest.header.session;
-            let of_session = |next: &&mut (Option<usize>, Frame)| next.1.header.session == session;
-            if let Some((_, next)) = waiting.frames.range_mut(at..).find(of_session) {
-                next.cut = true;
-            } else if frame.header.session == session {
-                frame.cut = true;
+            let follows = |next: &&mut (Option<usize>, Frame)| {
+                next.0 == source && next.1.header.session == session
+            };
+            match waiting.frames.range_mut(at..).find(follows) {
+                Some((_, next)) => next.cut = true,
+                None => frame.cut |= frame.header.session == session,
             }
             waiting.spare.push(oldest);
             self.passed_over.fetch_add(1, Ordering::Relaxed);

@@ -53,7 +53,7 @@ impl Source {
         Some(place)
     }
 
-    /// A body hangs on another one now, or does no more; its place and seat, if it has one.
+    /// A body hangs on another one now, or does no more; its place and seat, if that is news.
     pub(in super::super) fn hang_body(
         &mut self,
         name: &str,
@@ -61,7 +61,14 @@ impl Source {
     ) -> Option<(usize, Seat)> {
         let place = self.place_of(name)?;
         let member = self.members.get_mut(place)?;
+        if member.seat.attached == attached {
+            return None;
+        }
         member.seat.attached = attached;
+        if !attached && matches!(member.last, Some(Err(_))) {
+            // That was not handed on while it hung.
+            member.last = None;
+        }
         Some((place, member.seat))
     }
 

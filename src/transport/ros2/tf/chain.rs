@@ -95,20 +95,18 @@ impl Tree {
     /// A single link is handed on as it came, so that its pose is bit by bit what the sender wrote.
     pub(in super::super) fn find(&self, frame: usize, root: usize) -> Result<Found, Missing> {
         let mut ages = Ages::NONE;
-        let end = match self.climb((frame, root), &mut ages) {
+        let first = match self.climb((frame, root), &mut ages) {
             Ok(Climb { pose, single }) => {
                 let (position, orientation) = single.unwrap_or_else(|| numbers(pose));
                 return Ok(ages.found(position, orientation));
             }
-            Err(Missing::Frame(end)) => end,
+            // A bad link may lie above where both ways meet.
+            Err(first @ (Missing::Frame(_) | Missing::Bad(..))) => first,
             Err(other) => return Err(other),
         };
-        let top = self.joint(frame, root).map_err(|at| {
-            if at == root {
-                Missing::Frame(end)
-            } else {
-                Missing::Apart(end, self.name(at))
-            }
+        let top = self.joint(frame, root).map_err(|at| match first {
+            Missing::Frame(end) if at != root => Missing::Apart(end, self.name(at)),
+            other => other,
         })?;
         let mut ages = Ages::NONE;
         let up = self.climb((frame, top), &mut ages)?.pose;

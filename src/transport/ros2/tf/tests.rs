@@ -239,6 +239,17 @@ fn chains_that_do_not_meet_are_told_with_both_ends() {
     assert_eq!(tree.find(tool, root), Err(bad));
 }
 
+#[test]
+fn bug_a_bad_link_above_the_frame_that_joins_two_chains_refused_bodies_that_do_not_need_it() {
+    let (mut tree, root) = odom();
+    tree.take(&link("map", "obstacle", 3.0, 140), false, 9, BACK_NS);
+    let mut zero = link("earth", "map", 1.0, 1);
+    zero.transform.rotation = [0.0; 4].into();
+    tree.take(&zero, false, 1, BACK_NS);
+    let obstacle = tree.pin("obstacle");
+    assert!(tree.find(obstacle, root).is_ok());
+}
+
 /// Three stamps of a clock that began anew; what the last of them makes of it.
 fn restart(tree: &mut Tree, parent: &str, child: &str) -> Taken {
     tree.take(&link(parent, child, 1.0, 2000), false, 1, BACK_NS);
