@@ -174,15 +174,17 @@ def test_ids_stay_lifetimes_follow_the_rate_and_lists_are_of_the_right_kind(room
             room.spin(0.05)
         return [m.lifetime.sec + m.lifetime.nanosec / 1e9 for m in heard["markers"][-1].markers]
 
-    # Longer where ticks were rarer than that.
-    assert lifetimes() == pytest.approx([0.45] * 4, abs=0.1500001), "three periods of 10 Hz"
+    # Three periods of 10 Hz, and longer where ticks were rarer than that.
+    times = lifetimes()
+    assert len(times) == 4 and all(0.3 - 1e-6 < time < 1.5 for time in times), times
     assert len(heard["markers"]) >= 4
     for message in heard["markers"]:
         assert [(m.ns, m.id, m.type, m.action) for m in message.markers] == [(ns, 0, kind, Marker.ADD) for ns, kind in kinds.items()]
         assert all(m.pose.orientation.w == 1.0 and m.scale.x > 0 and m.color.a > 0 for m in message.markers)
     set_parameter(room, "markers_rate_hz", 2.0)
     start = len(heard["markers"])
-    assert lifetimes() == pytest.approx([1.5] * 4)
+    times = lifetimes()
+    assert len(times) == 4 and all(1.5 - 1e-6 < time < 7.5 for time in times), times
     assert 1 <= len(heard["markers"]) - start <= 4, "0.6 s at 2 Hz"
     set_parameter(room, "publish_markers", False)
     room.spin(0.6)
