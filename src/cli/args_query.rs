@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::Args;
 
 use super::args::Which;
-use super::values::nanoseconds;
+use super::values::{nanoseconds, number_and_unit};
 
 #[derive(Debug, Args)]
 pub(super) struct QueryArgs {
@@ -258,11 +258,7 @@ pub(super) fn length_m(text: &str) -> Result<f64, String> {
             "`{text}` is not a length: write a number from 0 on with um, mm, cm, m or km, such as 5cm"
         )
     };
-    let split = text
-        .rfind(|c: char| !c.is_ascii_alphabetic())
-        .map_or(0, |at| at + 1);
-    let (number, unit) = text.split_at_checked(split).ok_or_else(wanted)?;
-    let number: f64 = number.trim().parse().map_err(|_| wanted())?;
+    let (number, unit) = number_and_unit(text).ok_or_else(wanted)?;
     let in_metres = match unit {
         "um" => number / 1e6,
         "mm" => number / 1e3,

@@ -52,6 +52,15 @@ pub(super) fn ticks_of_report(text: &str) -> Result<u64, String> {
     number.ok_or_else(|| "write a whole number from 1 to 1000000".to_owned())
 }
 
+/// A number and the letters behind it; those of an exponent are its own.
+pub(super) fn number_and_unit(text: &str) -> Option<(f64, &str)> {
+    let split = text
+        .rfind(|c: char| !c.is_ascii_alphabetic())
+        .map_or(0, |at| at + 1);
+    let (number, unit) = text.split_at_checked(split)?;
+    Some((number.trim().parse().ok()?, unit))
+}
+
 /// Nanoseconds of `2ms`, `1.5s`, `1e-3s`, `500us`, `100ns`, `0`.
 pub(super) fn nanoseconds(text: &str) -> Result<u64, String> {
     let wanted = || {
@@ -59,11 +68,7 @@ pub(super) fn nanoseconds(text: &str) -> Result<u64, String> {
             "`{text}` is not a time: write a number from 0 on with ns, us, ms or s, such as 2ms"
         )
     };
-    let split = text
-        .rfind(|c: char| !c.is_ascii_alphabetic())
-        .map_or(0, |at| at + 1);
-    let (number, unit) = text.split_at_checked(split).ok_or_else(wanted)?;
-    let number: f64 = number.trim().parse().map_err(|_| wanted())?;
+    let (number, unit) = number_and_unit(text).ok_or_else(wanted)?;
     let scale = match unit {
         "ns" => 1.0,
         "us" => 1e3,
