@@ -17,7 +17,7 @@ impl Engine {
         let fault = asked.then(|| self.repair()).flatten();
         self.world.begin_tick(self.tick, now_ns);
         self.edit(input, laps, fault.as_deref());
-        self.admit_frames(input.inbox, now_ns, input.cause_source);
+        self.admit_frames(input.inbox, now_ns);
         let limited = self.config.budget.is_limited();
         // Who has no time because only ages are judged says nothing of what the others will have.
         let ages_only = input.budget.units == Some(0) && input.cause != TickCause::Frame;
@@ -70,8 +70,7 @@ impl Engine {
         }
     }
 
-    /// * `lead` - place of the source whose tick it is; `None`: it is everybody's.
-    fn admit_frames(&mut self, inbox: &Inbox, now_ns: u64, lead: Option<usize>) {
+    fn admit_frames(&mut self, inbox: &Inbox, now_ns: u64) {
         let frames = inbox.frames();
         for (at, frame) in frames.iter().enumerate() {
             self.end_before(
@@ -92,13 +91,10 @@ impl Engine {
             self.world.end_session(session);
         }
         self.world.age(now_ns);
-        // Of each source the newest: the result of the others is told to nobody. A tick that is one source's is not cut
-        // short for others, whose frames waited for it for as long as that one liked.
+        // Only the newest frame of each source may shorten the tick: nobody waits for the result of the older ones.
         let (end, clock) = (&mut self.end, self.clock.as_ref());
-        self.world.tell_admitted(|source, header, received_ns| {
-            if lead.is_none_or(|lead| lead == source.index()) {
-                end.shorten(header, (received_ns, now_ns), clock);
-            }
+        self.world.tell_admitted(|header, received_ns| {
+            end.shorten(header, (received_ns, now_ns), clock);
         });
     }
 

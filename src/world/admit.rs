@@ -335,10 +335,10 @@ impl World {
 
     /// Tells header and receipt (`CLOCK_BOOTTIME`, nanoseconds) of the newest frame of each source that was admitted
     /// since the last call.
-    pub fn tell_admitted(&mut self, mut tell: impl FnMut(SourceSlot, &FrameHeader, u64)) {
-        for (place, source) in self.sources.iter_mut().enumerate() {
+    pub fn tell_admitted(&mut self, mut tell: impl FnMut(&FrameHeader, u64)) {
+        for source in &mut self.sources {
             if let Some((header, received_ns)) = source.admitted.take() {
-                tell(SourceSlot::at(place), &header, received_ns);
+                tell(&header, received_ns);
             }
         }
     }

@@ -100,25 +100,6 @@ fn law_4_5_bug_what_a_tick_took_before_it_began_was_charged_twice_to_the_time_th
 }
 
 #[test]
-fn law_4_5_bug_a_tick_of_the_leading_source_was_cut_short_for_the_frame_of_another() {
-    for (lead, is_short) in [(None, true), (Some(0), true), (Some(1), false)] {
-        let mut rig = pairs();
-        // It was over long before the lead sent.
-        (rig.deadline_ns, rig.lead) = (1, lead);
-        let row = collide(&mut rig, ALL);
-        let budget_ns = if is_short { 0 } else { u64::MAX };
-        assert_eq!(
-            (row.budget_ns, row.overrun),
-            (budget_ns, u8::from(is_short))
-        );
-        assert_eq!(row.possible == PAIRS, is_short);
-        // Nor is it for the next tick.
-        rig.deadline_ns = 0;
-        assert_eq!(collide(&mut rig, ALL).budget_ns, u64::MAX);
-    }
-}
-
-#[test]
 fn law_4_5_a_frames_deadline_never_lengthens_the_budget() {
     let budget = Budget::time_ns(SHORT_NS);
     let plain = collide(&mut pairs(), budget);

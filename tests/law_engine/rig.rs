@@ -106,8 +106,6 @@ pub(crate) struct Rig {
     pub(crate) waited_ns: u64,
     /// Between a tick's wake-up and the tick.
     pub(crate) woken_ns: u64,
-    /// Place of the source whose tick each is; `None`: everybody's.
-    pub(crate) lead: Option<usize>,
     /// Ticks that went out alone while the last one was under way.
     pub(crate) pulses: Vec<TickRow>,
     /// Whether the whole structure is checked after each tick.
@@ -149,7 +147,6 @@ impl Rig {
             scene_rev: 0,
             waited_ns: 0,
             woken_ns: 0,
-            lead: None,
             pulses: Vec::new(),
             checked: true,
             seq: 0,
@@ -293,7 +290,7 @@ impl Rig {
             demand: self.demand,
             budget,
             cause,
-            cause_source: self.lead,
+            cause_source: None,
             woke_ns,
             pulse: Some(&mut pulse),
         };
