@@ -24,7 +24,7 @@ use super::probe::Probe;
 use super::sweep::{Finds, Search};
 use super::team::Team;
 use super::verlet::Verlet;
-use super::{BodySlot, MANY_CAME, Order, Proxies, Tick, Work as Done, give_back, parts};
+use super::{BodySlot, MANY_CAME, Order, Proxies, Tick, Work, give_back, parts};
 use crate::broad::members::{ASKED, CAME, Members};
 use crate::ids::PairKey;
 use crate::simd::boxes::prefetch;
@@ -120,7 +120,7 @@ impl Order {
     }
 
     /// A tick without candidates.
-    pub(super) fn work_afresh<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
+    pub(super) fn work_afresh<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Work) {
         work.way = Some((BroadMode::Scratch, self.afresh.gear.cause));
         self.update_afresh(tick, work);
         let Afresh {
@@ -140,7 +140,7 @@ impl Order {
     }
 
     /// Finds every overlap and reports what differs from the last tick.
-    fn update_afresh<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
+    fn update_afresh<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Work) {
         let was = self.afresh.on;
         if !was {
             self.begin_afresh();
@@ -210,7 +210,7 @@ impl Order {
     }
 
     /// Finds every overlap; returns the boxes compared with a block.
-    fn find_overlaps<P: Proxies>(&mut self, tick: &Tick<'_, P>, work: &mut Done) -> u64 {
+    fn find_overlaps<P: Proxies>(&mut self, tick: &Tick<'_, P>, work: &mut Work) -> u64 {
         let Afresh { finds, team, .. } = &mut self.afresh;
         let blocks = self.live.len();
         let lanes = (&mut self.live, &mut self.fat, &mut self.tree);

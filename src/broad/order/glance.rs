@@ -5,7 +5,7 @@ use super::curve::centre;
 use super::home::widen;
 use super::ones;
 use super::tree::NO_BOUND;
-use crate::simd::boxes::{Down, Lanes, WIDTH, Work};
+use crate::simd::boxes::{Down, Kernel, Lanes, WIDTH};
 
 /// The centres of the bodies of a block.
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +61,7 @@ pub(super) struct LookOver<'a> {
     pub(super) exact: &'a [[Down; WIDTH]],
 }
 
-impl Work for LookOver<'_> {
+impl Kernel for LookOver<'_> {
     type Out = [Glance; WIDTH];
 
     #[inline(always)]

@@ -6,7 +6,7 @@
 use super::afresh::Afresh;
 use super::lay::Bound;
 use super::{BodySlot, MANY_CAME, NONE, Order, PairKey, Proxies, Tick, ones, parts, small};
-use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch};
+use crate::simd::boxes::{Kernel, Lanes, WIDTH, prefetch};
 
 /// Bodies ahead whose boxes are prefetched.
 const AHEAD: usize = 8;
@@ -103,7 +103,7 @@ struct Seat<'a, P> {
     blocks: &'a mut Vec<u32>,
 }
 
-impl<P: Proxies> Work for Seat<'_, P> {
+impl<P: Proxies> Kernel for Seat<'_, P> {
     type Out = bool;
 
     #[inline(always)]

@@ -11,7 +11,7 @@ use super::load::Taking;
 use super::place::{ATTIC, grow, middle};
 use super::sort::{FILL, Sorter};
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, is_thrifty, ones, parts, small};
-use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work, prefetch};
+use crate::simd::boxes::{Boxes16, Down, Kernel, Lanes, WIDTH, prefetch};
 
 /// Laying out a body costs as much as this many comparisons of a box with a block.
 pub(super) const LAY_TESTS: u32 = 12;
@@ -221,7 +221,7 @@ struct TakeAll<'a, P> {
     boxes: &'a mut Vec<[f32; 6]>,
 }
 
-impl<P: Proxies> Work for TakeAll<'_, P> {
+impl<P: Proxies> Kernel for TakeAll<'_, P> {
     type Out = ();
 
     #[inline(always)]
@@ -249,7 +249,7 @@ pub(super) struct TakeLanes<'a, P> {
     pub(super) proxies: &'a P,
 }
 
-impl<P: Proxies> Work for TakeLanes<'_, P> {
+impl<P: Proxies> Kernel for TakeLanes<'_, P> {
     type Out = usize;
 
     #[inline(always)]
@@ -283,7 +283,7 @@ pub(super) struct Bound<'a, B> {
     pub(super) blocks: B,
 }
 
-impl<B: Iterator<Item = usize>> Work for Bound<'_, B> {
+impl<B: Iterator<Item = usize>> Kernel for Bound<'_, B> {
     type Out = ();
 
     #[inline(always)]

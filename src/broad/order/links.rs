@@ -150,7 +150,7 @@ impl Links {
 
     /// Prefetches a block's list.
     #[inline(always)]
-    pub(super) fn ask(&self, block: u32) {
+    pub(super) fn prefetch_list(&self, block: u32) {
         if let Some(piece) = self.pieces.get(self.heads[block as usize] as usize) {
             prefetch(piece);
         }

@@ -2,7 +2,7 @@
 
 use super::fatten::HORIZON;
 use super::{BodySlot, NONE, Order, Proxies, Tick, ones, parts, small};
-use crate::simd::boxes::{Down, Held, Lanes, WIDTH, Work, prefetch};
+use crate::simd::boxes::{Down, Held, Kernel, Lanes, WIDTH, prefetch};
 
 /// Lanes that moved and whose fat box is at least this old are renewed at their block's turn, or together with a lane
 /// of their block that must be: they share the walk down the tree, and would be next anyway.
@@ -198,7 +198,7 @@ impl<'a> Taking<'a> {
 
     /// Prefetches the holds of the block ahead.
     #[inline(always)]
-    fn ask(self, held: &[Held]) {
+    fn prefetch(self, held: &[Held]) {
         for ahead in self.ahead {
             if let Some(hold) = held.get(*ahead as usize) {
                 prefetch(hold);
@@ -223,7 +223,7 @@ struct LoadBlocks<'a, 'b, P> {
     tick: &'a Tick<'b, P>,
 }
 
-impl<P: Proxies> Work for LoadBlocks<'_, '_, P> {
+impl<P: Proxies> Kernel for LoadBlocks<'_, '_, P> {
     type Out = ();
 
     #[inline(always)]
@@ -236,7 +236,7 @@ impl<P: Proxies> Work for LoadBlocks<'_, '_, P> {
                 continue;
             }
             let taking = Taking::of(&order.slot_of, block);
-            taking.ask(&order.held);
+            taking.prefetch(&order.held);
             let exact = &mut order.exact.as_chunks_mut::<WIDTH>().0[block];
             let mut out = 0;
             for lane in ones(moved) {
@@ -260,7 +260,7 @@ struct LoadBodies<'a, 'b, P> {
     tick: &'a Tick<'b, P>,
 }
 
-impl<P: Proxies> Work for LoadBodies<'_, '_, P> {
+impl<P: Proxies> Kernel for LoadBodies<'_, '_, P> {
     type Out = ();
 
     #[inline(always)]

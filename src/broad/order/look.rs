@@ -7,9 +7,9 @@
 use super::entry::{Entry, ages};
 use super::fatten::outward;
 use super::links::Matrix;
-use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, is_thrifty, ones, parts, small};
+use super::{BodySlot, NONE, Order, Proxies, Tick, Work, is_thrifty, ones, parts, small};
 use crate::ids::PairKey;
-use crate::simd::boxes::{Boxes16, Down, Hold, LANES, Lanes, WIDTH, Work, prefetch, slack};
+use crate::simd::boxes::{Boxes16, Down, Hold, Kernel, LANES, Lanes, WIDTH, prefetch, slack};
 
 /// Result of comparing an entry; `at` is the entry's index.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +24,7 @@ const AHEAD: usize = 24;
 
 impl Order {
     /// Compares every candidate, using the flat list.
-    pub(super) fn look_at_all<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
+    pub(super) fn look_at_all<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Work) {
         if !self.listed {
             let level = self.level;
             level.run(ListAll {
@@ -195,7 +195,7 @@ struct ListAll<'a> {
     began: &'a mut Vec<PairKey>,
 }
 
-impl Work for ListAll<'_> {
+impl Kernel for ListAll<'_> {
     type Out = ();
 
     #[inline(always)]
@@ -228,7 +228,7 @@ trait Source {
     fn get<L: Lanes>(&self, lanes: L, rank: u32) -> Down;
 
     /// Prefetches a box.
-    fn ask(&self, rank: u32);
+    fn prefetch(&self, rank: u32);
 }
 
 /// Stored boxes, by rank.
@@ -241,7 +241,7 @@ impl Source for Stored<'_> {
     }
 
     #[inline(always)]
-    fn ask(&self, rank: u32) {
+    fn prefetch(&self, rank: u32) {
         prefetch(&self.0[rank as usize]);
     }
 }
@@ -264,7 +264,7 @@ impl<P: Proxies> Source for OfWorld<'_, P> {
     }
 
     #[inline(always)]
-    fn ask(&self, rank: u32) {
+    fn prefetch(&self, rank: u32) {
         let slot = self.slot_of[rank as usize];
         if slot != NONE {
             prefetch(self.proxies.aabb(BodySlot(slot)));
@@ -281,7 +281,7 @@ struct Look<'a, S> {
     found: &'a mut Vec<Found>,
 }
 
-impl<S: Source> Work for Look<'_, S> {
+impl<S: Source> Kernel for Look<'_, S> {
     type Out = ();
 
     #[inline(always)]
@@ -296,8 +296,8 @@ impl<S: Source> Work for Look<'_, S> {
         for at in 0..entries.len() {
             if let Some(next) = entries.get(at + AHEAD) {
                 let [one, other] = next.ranks();
-                boxes.ask(one);
-                boxes.ask(other);
+                boxes.prefetch(one);
+                boxes.prefetch(other);
             }
             let entry = entries[at];
             let [a, b] = entry.ranks();

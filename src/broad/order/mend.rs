@@ -91,7 +91,7 @@ impl Order {
             let block = self.worklist[at] as usize;
             for lane in ones(self.jumped_clear(block)) {
                 let slot = BodySlot(self.slot_of[block * WIDTH + lane]);
-                self.evict(slot, true);
+                self.evict(slot);
                 self.homeless.push(slot);
             }
         }
@@ -221,7 +221,7 @@ impl Order {
         };
         let slot = BodySlot(self.slot_of[from]);
         let (gait, held) = (self.gaits[from], self.held[slot.index()]);
-        self.evict(slot, true);
+        self.evict(slot);
         self.seat(slot, to, boxed);
         let to = to as usize;
         (self.gaits[to], self.held[slot.index()]) = (gait, held);

@@ -8,7 +8,7 @@ use super::idle::shed;
 use super::links::{EMPTY, Matrix, room, spare};
 use super::{BodySlot, parts};
 use crate::ids::{PairKey, small};
-use crate::simd::boxes::{Lanes, Level, Portable, WIDTH, Work};
+use crate::simd::boxes::{Kernel, Lanes, Level, Portable, WIDTH};
 
 /// The overlaps of a tick.
 #[derive(Debug, Default)]
@@ -191,7 +191,7 @@ struct Carry<'a> {
     carried: &'a mut Vec<(u32, u32)>,
 }
 
-impl Work for Carry<'_> {
+impl Kernel for Carry<'_> {
     type Out = ();
 
     #[inline(always)]
@@ -255,7 +255,7 @@ pub(super) struct TellDifference<'a> {
     pub(super) began: &'a mut Vec<PairKey>,
 }
 
-impl Work for TellDifference<'_> {
+impl Kernel for TellDifference<'_> {
     type Out = ();
 
     #[inline(always)]

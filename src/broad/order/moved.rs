@@ -11,8 +11,8 @@ use super::bits::each_bit;
 use super::idle::{give_back, is_thrifty};
 use super::links::{Bits, Links, Matrix, room};
 use super::look::{is_as_before, overlap, verdict};
-use super::{BodySlot, MANY_MOVED, Order, Proxies, Tick, Work as Done, parts, small};
-use crate::simd::boxes::{Down, LANES, Lanes, WIDTH, Work, prefetch};
+use super::{BodySlot, MANY_MOVED, Order, Proxies, Tick, Work, parts, small};
+use crate::simd::boxes::{Down, Kernel, LANES, Lanes, WIDTH, prefetch};
 
 /// While at least one in this many bodies moved, an existing candidate list is kept: to list them again costs as much
 /// as some ticks, so the list is dropped later than it is made.
@@ -152,7 +152,7 @@ impl Order {
     }
 
     /// Tests the candidates of moved bodies, one by one.
-    pub(super) fn look_at_moved<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
+    pub(super) fn look_at_moved<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Work) {
         self.give_back_list();
         let mut gather = std::mem::take(&mut self.gather);
         // After candidates were dropped there is no memory; a sort reserves what it finds.
@@ -178,10 +178,10 @@ impl Order {
 
     /// Prefetches data of the next bodies, which are far apart in memory.
     #[inline(always)]
-    fn ask_ahead(&self, moved: &[BodySlot]) {
+    fn prefetch_ahead(&self, moved: &[BodySlot]) {
         let rank = |ahead: usize| moved.get(ahead).and_then(|slot| self.rank(*slot));
         if let Some(rank) = rank(AHEAD_LISTS) {
-            self.links.ask(small(parts(rank).0));
+            self.links.prefetch_list(small(parts(rank).0));
         }
         if let Some(rank) = rank(AHEAD_BITS) {
             for (_, record) in self.links.of(small(parts(rank).0)) {
@@ -198,7 +198,7 @@ struct LookAtMoved<'a> {
     gather: &'a mut Gather,
 }
 
-impl Work for LookAtMoved<'_> {
+impl Kernel for LookAtMoved<'_> {
     type Out = ();
 
     #[inline(always)]
@@ -215,7 +215,7 @@ impl Work for LookAtMoved<'_> {
                 Some(slot) => *slot,
                 None => order.homeless[at - moved.len()],
             };
-            order.ask_ahead(moved.get(at..).unwrap_or(&[]));
+            order.prefetch_ahead(moved.get(at..).unwrap_or(&[]));
             if let Some(rank) = order.rank(slot) {
                 kept.put(lanes, &order.links, &order.exact, rank);
             }
@@ -234,7 +234,7 @@ mod tests {
     /// Tests the candidates of some ranks.
     struct Ask<'a>(&'a Links, &'a [Down], &'a [u32], &'a mut Gather);
 
-    impl Work for Ask<'_> {
+    impl Kernel for Ask<'_> {
         type Out = ();
 
         #[inline(always)]

@@ -7,7 +7,7 @@ use super::look::{is_as_before, overlap, verdict};
 use super::verlet::Verlet;
 use super::{BodySlot, NONE, Order, Proxies, Tick, ones};
 use crate::ids::{PairKey, small};
-use crate::simd::boxes::{Down, Lanes, WIDTH, Work, prefetch};
+use crate::simd::boxes::{Down, Kernel, Lanes, WIDTH, prefetch};
 
 /// Entries ahead whose boxes are prefetched.
 const AHEAD: usize = 16;
@@ -190,14 +190,14 @@ struct Settle<'a> {
     found: &'a mut Vec<Found>,
 }
 
-impl Work for Settle<'_> {
+impl Kernel for Settle<'_> {
     type Out = usize;
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) -> usize {
         let mut hits = 0;
         for at in 0..self.entries.len() {
-            ask_ahead(self.exact, self.entries, at);
+            prefetch_ahead(self.exact, self.entries, at);
             let [a, b] = self.entries[at].ranks();
             let (apart, sure) = lanes.parts(&self.exact[a], &self.exact[b]);
             self.entries[at].one |= if sure { HIT } else { 0 };
@@ -213,7 +213,7 @@ impl Work for Settle<'_> {
 
 /// Prefetches the boxes of an entry: either may be in the block that the search was at.
 #[inline(always)]
-fn ask_ahead(exact: &[Down], entries: &[Near], at: usize) {
+fn prefetch_ahead(exact: &[Down], entries: &[Near], at: usize) {
     if let Some(next) = entries.get(at + AHEAD) {
         for rank in next.ranks() {
             prefetch(&exact[rank]);
@@ -234,7 +234,7 @@ struct Look<'a> {
     parted: &'a mut Vec<PairKey>,
 }
 
-impl Work for Look<'_> {
+impl Kernel for Look<'_> {
     type Out = usize;
 
     #[inline(always)]
@@ -242,7 +242,7 @@ impl Work for Look<'_> {
         let (mut kept, mut lost) = (self.from, 0);
         let (exact, entries) = (self.exact, &mut self.entries[..]);
         for at in self.from..entries.len() {
-            ask_ahead(exact, entries, at);
+            prefetch_ahead(exact, entries, at);
             let entry = entries[at];
             let [a, b] = entry.ranks();
             entries[kept] = entry;

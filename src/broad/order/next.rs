@@ -11,14 +11,14 @@ use super::afresh::Afresh;
 use super::idle::shed;
 use super::links::{room, spare};
 use super::sweep::Search;
-use super::{Order, Proxies, Tick, Work as Done, is_thrifty};
+use super::{Order, Proxies, Tick, Work, is_thrifty};
 use crate::ids::small;
 use crate::simd::boxes::WIDTH;
 
 impl Order {
     /// Begins the list, to be made in `ticks` ticks. The first of several, in which all boxes are swept, does no
     /// search.
-    pub(super) fn open_next(&mut self, ticks: u32, work: &mut Done) {
+    pub(super) fn open_next(&mut self, ticks: u32, work: &mut Work) {
         let blocks = self.live.len();
         let Afresh { verlet, finds, .. } = &mut self.afresh;
         let runs = (ticks as usize).saturating_sub(1).max(1);
@@ -33,7 +33,7 @@ impl Order {
     }
 
     /// Searches the next run of blocks.
-    pub(super) fn search_next(&mut self, work: &mut Done) {
+    pub(super) fn search_next(&mut self, work: &mut Work) {
         let Afresh {
             verlet,
             finds,

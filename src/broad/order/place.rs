@@ -7,7 +7,7 @@ use super::idle;
 use super::links::{room, spare};
 use super::sort::{FILL, Sorter};
 use super::tree::NO_BOUND;
-use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, ones, parts};
+use super::{BodySlot, NONE, Order, Proxies, Tick, Work, ones, parts};
 use crate::ids::small;
 use crate::simd::boxes::{Boxes16, Down, Held, Portable, WIDTH};
 
@@ -18,17 +18,13 @@ const WORN_PER_BODY: u64 = 20;
 pub(super) const ATTIC: usize = 16;
 
 impl Order {
-    /// Takes a body's lane away.
-    ///
-    /// * `carry` - whether its overlaps are saved: it gets another lane in this tick.
-    pub(super) fn evict(&mut self, slot: BodySlot, carry: bool) {
+    /// Takes a body's lane away and saves its overlaps: it gets another lane in this tick.
+    pub(super) fn evict(&mut self, slot: BodySlot) {
         let Some(rank) = self.rank(slot) else { return };
         let (block, lane) = parts(rank);
-        if carry {
-            let mut carried = std::mem::take(&mut self.carried);
-            self.each_bit(rank, |bits| bits.hit, |other| carried.push((slot.0, other)));
-            self.carried = carried;
-        }
+        let mut carried = std::mem::take(&mut self.carried);
+        self.each_bit(rank, |bits| bits.hit, |other| carried.push((slot.0, other)));
+        self.carried = carried;
         self.unlink(block, 1 << lane);
         self.vacate_lane(rank);
     }
@@ -144,7 +140,7 @@ impl Order {
 
     /// Sorts everything again: every body, including homeless ones, gets a lane and a fat box, and all candidates are
     /// found.
-    pub(super) fn sort_anew<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
+    pub(super) fn sort_anew<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Work) {
         done.rebuilds += 1;
         self.carry_all();
         let bodies = tick.members.bounded();

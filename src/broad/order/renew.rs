@@ -13,12 +13,12 @@ use scratch::Close;
 use super::fatten::loose;
 use super::links::{Bits, EMPTY, Matrix};
 use super::look::sure;
-use super::{BodySlot, NONE, Order, PairKey, Proxies, Tick, Work as Done, ones, parts, small};
-use crate::simd::boxes::{Held, Lanes, WIDTH, Work, prefetch};
+use super::{BodySlot, NONE, Order, PairKey, Proxies, Tick, Work, ones, parts, small};
+use crate::simd::boxes::{Held, Kernel, Lanes, WIDTH, prefetch};
 
 impl Order {
     /// Renews the lanes marked in `renewing`.
-    pub(super) fn renew<P>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
+    pub(super) fn renew<P>(&mut self, tick: &mut Tick<'_, P>, done: &mut Work) {
         self.worklist.sort_unstable();
         self.worklist.dedup();
         if self.worklist.is_empty() {
@@ -38,7 +38,7 @@ impl Order {
     }
 
     /// Renews every lane, after a sort; the blocks met by a query now become the usual number.
-    pub(super) fn renew_all<P>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
+    pub(super) fn renew_all<P>(&mut self, tick: &mut Tick<'_, P>, done: &mut Work) {
         self.worklist.clear();
         for block in 0..self.live.len() {
             self.renewing[block] = 0;
@@ -96,10 +96,10 @@ struct Renew<'a> {
     order: &'a mut Order,
     began: &'a mut Vec<PairKey>,
     parted: &'a mut Vec<PairKey>,
-    done: &'a mut Done,
+    done: &'a mut Work,
 }
 
-impl Work for Renew<'_> {
+impl Kernel for Renew<'_> {
     type Out = u64;
 
     /// Returns the number of blocks that all queries met.

@@ -8,7 +8,7 @@ use super::fatten::{hold_of_seen, outward};
 use super::idle::{is_thrifty, shed};
 use super::links::room;
 use super::{BodySlot, Order, Proxies, Tick};
-use crate::simd::boxes::{Down, Held, Hold, Lanes, Work};
+use crate::simd::boxes::{Down, Held, Hold, Kernel, Lanes};
 
 /// Least number of ticks observed for the result to be used.
 const LEAST: u32 = 8;
@@ -83,7 +83,7 @@ struct See<'a, P> {
     proxies: &'a P,
 }
 
-impl<P: Proxies> Work for See<'_, P> {
+impl<P: Proxies> Kernel for See<'_, P> {
     type Out = ();
 
     #[inline(always)]

@@ -12,7 +12,7 @@ use std::ops::Range;
 use super::fatten::{HORIZON, outward};
 use super::load::Taking;
 use super::{BodySlot, Order, Proxies, Tick, ones, parts};
-use crate::simd::boxes::{Lanes, WIDTH, Work};
+use crate::simd::boxes::{Kernel, Lanes, WIDTH};
 
 /// This mode begins when no more than one body in this many was renewed in the last tick.
 const CALM: u64 = 64;
@@ -76,7 +76,7 @@ struct LoadStanding<'a, 'b, P> {
     tick: &'a Tick<'b, P>,
 }
 
-impl<P: Proxies> Work for LoadStanding<'_, '_, P> {
+impl<P: Proxies> Kernel for LoadStanding<'_, '_, P> {
     type Out = ();
 
     #[inline(always)]
@@ -119,7 +119,7 @@ struct CatchUp<'a, P> {
     proxies: &'a P,
 }
 
-impl<P: Proxies> Work for CatchUp<'_, P> {
+impl<P: Proxies> Kernel for CatchUp<'_, P> {
     type Out = ();
 
     #[inline(always)]

@@ -16,7 +16,7 @@ use super::links::{EMPTY, Matrix, room, spare};
 use super::met::Met;
 use super::near::Near;
 use super::tree::{Tree, Walk};
-use crate::simd::boxes::{Boxes16, LANES, Lanes, WIDTH, Work, prefetch, slack};
+use crate::simd::boxes::{Boxes16, Kernel, LANES, Lanes, WIDTH, prefetch, slack};
 
 /// Nearby blocks that are processed together: what the passes hand on stays in the first-level cache.
 const TOGETHER: usize = 64;
@@ -158,7 +158,7 @@ pub(super) struct Sweep<'a> {
     pub(super) search: Search,
 }
 
-impl Work for Sweep<'_> {
+impl Kernel for Sweep<'_> {
     type Out = ();
 
     #[inline(always)]

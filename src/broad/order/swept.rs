@@ -9,7 +9,7 @@ use super::pace::Phase;
 use super::verlet::Verlet;
 use super::{Order, Proxies, ones};
 use crate::ids::small;
-use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work};
+use crate::simd::boxes::{Boxes16, Down, Kernel, Lanes, WIDTH};
 
 impl Order {
     /// Saves the places of the bodies, so that the boxes of this tick show how they move.
@@ -126,7 +126,7 @@ struct TakeSwept<'a, P> {
     asks: bool,
 }
 
-impl<P: Proxies> Work for TakeSwept<'_, P> {
+impl<P: Proxies> Kernel for TakeSwept<'_, P> {
     type Out = usize;
 
     #[inline(always)]
@@ -280,7 +280,7 @@ struct TakeLaid<'a, P> {
     proxies: &'a P,
 }
 
-impl<P: Proxies> Work for TakeLaid<'_, P> {
+impl<P: Proxies> Kernel for TakeLaid<'_, P> {
     type Out = ();
 
     #[inline(always)]

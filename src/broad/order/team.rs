@@ -302,7 +302,7 @@ mod tests {
         tree: &'a mut Tree,
     }
 
-    impl crate::simd::boxes::Work for Bound<'_> {
+    impl crate::simd::boxes::Kernel for Bound<'_> {
         type Out = ();
 
         fn run<L: crate::simd::boxes::Lanes>(self, lanes: L) {

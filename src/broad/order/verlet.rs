@@ -28,9 +28,9 @@ use super::near::{Found, Near, is_among};
 use super::pace::{Pace, Phase};
 use super::presort::SPLIT_TICKS_MAX;
 use super::shares::Shares;
-use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, Work as Done, parts};
+use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, Work, parts};
 use crate::ids::{PairKey, small};
-use crate::simd::boxes::{Down, LANES, Lanes, Portable, WIDTH, Work};
+use crate::simd::boxes::{Down, Kernel, LANES, Lanes, Portable, WIDTH};
 use crate::wire::BroadMode;
 
 /// The list and the data it is made from.
@@ -86,7 +86,7 @@ impl Order {
         &mut self,
         tests: u64,
         tick: &mut Tick<'_, P>,
-        work: &mut Done,
+        work: &mut Work,
     ) {
         self.ask_course(self.afresh.laid > 1);
         let crowding = self.crowding(self.afresh.verlet.pace.first_ticks());
@@ -99,7 +99,7 @@ impl Order {
     }
 
     /// Lists near pairs, after a tick in which everything was reported.
-    fn begin_list<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
+    fn begin_list<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Work) {
         let Afresh {
             verlet,
             presort,
@@ -141,7 +141,7 @@ impl Order {
     pub(super) fn update_list<P: Proxies>(
         &mut self,
         tick: &mut Tick<'_, P>,
-        work: &mut Done,
+        work: &mut Work,
     ) -> bool {
         let (came, bodies) = (self.homeless.len(), tick.members.bounded().len());
         let pace = &mut self.afresh.verlet.pace;
@@ -273,7 +273,7 @@ impl Order {
     }
 
     /// Searches what is near the strays, and lists it.
-    fn list_strays<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
+    fn list_strays<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Work) {
         for at in 0..self.afresh.verlet.strays.len() {
             let rank = self.afresh.verlet.strays[at] as usize;
             if is_among(&self.live, rank) {
@@ -351,7 +351,7 @@ struct Seek<'a> {
     order: &'a mut Order,
 }
 
-impl Work for Seek<'_> {
+impl Kernel for Seek<'_> {
     type Out = ();
 
     #[inline(always)]

@@ -4,7 +4,7 @@
 //! one per lane or row, and plain results. `Portable` is the safe twin in plain Rust; every other set of `Lanes` gives
 //! the same bits, which tests compare. The level is chosen once, by the processor's features (`Level::best`).
 //!
-//! How: a caller writes its loop once as a `Work`, generic over `Lanes`, all of it `#[inline(always)]`; `Level::run`
+//! How: a caller writes its loop once as a `Kernel`, generic over `Lanes`, all of it `#[inline(always)]`; `Level::run`
 //! compiles it once per level inside a function with the level's instructions enabled, so that the whole loop, not only
 //! a kernel, is built for them. AVX2 is the main path, AVX-512 halves its instructions. On aarch64 NEON is part of
 //! every target, and the compiler builds the twin with it.
@@ -26,7 +26,7 @@ pub(crate) use hold::{Held, Hold};
 pub(crate) use lanes::{Boxes16, Down, LANES, Lanes, Portable, SPARE, WIDTH, slack};
 
 /// A loop that is built once for each set of lanes.
-pub(crate) trait Work {
+pub(crate) trait Kernel {
     /// Its result type.
     type Out;
     /// Runs it. Mark it `#[inline(always)]`, like what it calls in its hot part.
@@ -62,15 +62,15 @@ impl Level {
     }
 
     /// Runs a loop with these instructions; any that the processor lacks are never used.
-    pub(crate) fn run<W: Work>(self, work: W) -> W::Out {
+    pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Out {
         match self.checked() {
             // SAFETY: `checked` has tested that the processor has each feature that the function is built with.
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => unsafe { x86::run_avx512(work) },
+            Self::Avx512 => unsafe { x86::run_avx512(kernel) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => unsafe { x86::run_avx2(work) },
-            _ => work.run(Portable),
+            Self::Avx2 => unsafe { x86::run_avx2(kernel) },
+            _ => kernel.run(Portable),
         }
     }
 

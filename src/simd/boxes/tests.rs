@@ -9,7 +9,7 @@ use super::*;
 /// Runs all kernels on one block and records the results.
 struct Everything<'a>(&'a Boxes16, &'a [f32; 6], &'a Down, &'a Down);
 
-impl Work for Everything<'_> {
+impl Kernel for Everything<'_> {
     type Out = (u16, (bool, bool), bool);
 
     #[inline(always)]
@@ -77,7 +77,7 @@ fn every_level_gives_the_bits_of_the_safe_twin() {
 /// The columns of a matrix.
 struct Columns<'a>(&'a [u16; WIDTH]);
 
-impl Work for Columns<'_> {
+impl Kernel for Columns<'_> {
     type Out = [u16; WIDTH];
 
     #[inline(always)]
@@ -108,7 +108,7 @@ fn every_level_turns_a_matrix_by_its_columns() {
 /// The matrix of some rows.
 struct Spread(u16);
 
-impl Work for Spread {
+impl Kernel for Spread {
     type Out = [u16; WIDTH];
 
     #[inline(always)]
@@ -132,7 +132,7 @@ fn every_level_fills_the_rows_that_are_named() {
 /// Numbers some lanes.
 struct Numbered(u16, u32);
 
-impl Work for Numbered {
+impl Kernel for Numbered {
     type Out = Vec<u32>;
 
     #[inline(always)]
@@ -163,7 +163,7 @@ const FACES: [usize; 6] = [0, 1, 2, 4, 5, 6];
 /// Takes a box and returns whether it keeps to a hold.
 struct Taken<'a>([&'a [f64; 3]; 2], &'a [f64; 3], &'a Held);
 
-impl Work for Taken<'_> {
+impl Kernel for Taken<'_> {
     type Out = ([u32; 8], bool);
 
     #[inline(always)]
@@ -217,7 +217,7 @@ fn every_level_tells_alike_whether_a_box_keeps_to_its_hold() {
 /// Rounds a box.
 struct Rounded<'a>(&'a [f64; 3], &'a [f64; 3], &'a [f64; 3]);
 
-impl Work for Rounded<'_> {
+impl Kernel for Rounded<'_> {
     type Out = [u32; 8];
 
     #[inline(always)]
@@ -270,7 +270,7 @@ fn every_level_rounds_boxes_outward_to_the_same_bits() {
 /// Tests whether two boxes are apart.
 struct Parted<'a>(&'a Down, &'a Down);
 
-impl Work for Parted<'_> {
+impl Kernel for Parted<'_> {
     type Out = (bool, bool);
 
     #[inline(always)]
@@ -322,7 +322,7 @@ fn what_is_told_of_rounded_boxes_is_true_of_the_boxes() {
 /// Bounds a block.
 struct Bounded<'a>(&'a Boxes16, u16);
 
-impl Work for Bounded<'_> {
+impl Kernel for Bounded<'_> {
     type Out = [f32; 6];
 
     #[inline(always)]

@@ -20,7 +20,7 @@ use std::arch::x86_64::{
     _mm512_set1_ps,
 };
 
-use super::Work;
+use super::Kernel;
 use super::hold::Held;
 use super::lanes::{Boxes16, Down, LEAST, Lanes, SLACK_LEAST, SLACK_SHARE, STEP, WIDTH};
 use hold::{keeps_avx2, take_avx2};
@@ -33,14 +33,14 @@ struct Vectors<const WIDE: bool>(());
 
 /// Runs a loop built for AVX2.
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-pub(super) fn run_avx2<W: Work>(work: W) -> W::Out {
-    work.run(Vectors::<false>(()))
+pub(super) fn run_avx2<K: Kernel>(kernel: K) -> K::Out {
+    kernel.run(Vectors::<false>(()))
 }
 
 /// Runs a loop built for AVX-512.
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi1,bmi2,lzcnt,popcnt")]
-pub(super) fn run_avx512<W: Work>(work: W) -> W::Out {
-    work.run(Vectors::<true>(()))
+pub(super) fn run_avx512<K: Kernel>(kernel: K) -> K::Out {
+    kernel.run(Vectors::<true>(()))
 }
 
 #[inline]

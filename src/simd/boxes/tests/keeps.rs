@@ -2,12 +2,12 @@
 
 use super::super::lanes::{LEAST, STEP};
 use super::{FACES, next};
-use crate::simd::boxes::{Held, Hold, Lanes, Level, Portable, SPARE, Work};
+use crate::simd::boxes::{Held, Hold, Kernel, Lanes, Level, Portable, SPARE};
 
 /// Whether a box keeps to a hold, rounded to nearest.
 struct Kept<'a>([&'a [f64; 3]; 2], &'a [f64; 3], &'a Held);
 
-impl Work for Kept<'_> {
+impl Kernel for Kept<'_> {
     type Out = bool;
 
     #[inline(always)]
