@@ -772,3 +772,67 @@ fn bug_overlapping_boxes_nearly_in_line_had_an_interval_ten_times_too_wide() {
         assert_eq!(wrong, None, "{what}");
     }
 }
+
+/// A small curved shape before a large one, apart by a known gap that is a millionth of the size or less: along a
+/// direction that is across a face or side of the large one, or nearly, or any.
+fn before_large(r: &mut Random) -> (Solid, Solid, Pose, f64) {
+    let curved = |r: &mut Random, size: f64| match r.below(3) {
+        0 => Solid::Capsule(size * r.range(0.1, 1.0), size),
+        1 => Solid::Cylinder(size * r.range(0.1, 1.0), size),
+        _ => Solid::Cone(size * r.range(0.1, 1.0), size),
+    };
+    let large = match r.below(4) {
+        0 => Solid::Cuboid(Vec3::new(r.range(1.0, 9.0), r.range(1.0, 9.0), 5.0) * 10.0),
+        _ => curved(r, 50.0),
+    };
+    let size = 10.0_f64.powf(r.range(-4.0, -1.0));
+    let small = curved(r, size);
+    let lean = match r.below(3) {
+        0 => 0.0,
+        _ => 10.0_f64.powf(r.range(-8.0, -2.0)),
+    };
+    let dir = match r.below(3) {
+        0 => Vec3::z() + Vec3::x() * lean,
+        1 => Vec3::x() + Vec3::z() * lean + Vec3::y() * r.range(-1.0, 1.0),
+        _ => r.direction(),
+    };
+    let normal = dir.normalize();
+    let gap_m = 10.0_f64.powf(r.range(-7.5, -4.2));
+    let rotation = r.rotation();
+    let (a, b) = (large.build(), small.build());
+    let on_large = a.support(&normal).coords;
+    let inward = rotation.inverse() * -normal;
+    let on_small = rotation * b.support(&inward).coords;
+    let at = on_large + normal * gap_m - on_small;
+    let pose = Pose::from_parts(at.into(), rotation);
+    // The plane across the direction is as far from both as the two points are from each other.
+    let apart_m = f(&large, &small, &pose, &normal);
+    assert!(
+        (apart_m - gap_m).abs() < 1e-12,
+        "{apart_m} {gap_m} {large:?} {small:?}"
+    );
+    (large, small, pose, gap_m)
+}
+
+#[test]
+fn bug_a_small_curved_body_apart_from_a_large_one_by_a_millionth_of_its_size_collided() {
+    let mut r = Random(31);
+    let mut open = Vec::new();
+    for _ in 0..20_000 {
+        let (a, b, pose, gap_m) = before_large(&mut r);
+        let (ca, cb) = (a.build(), b.build());
+        for (one, other, pose) in [(&ca, &cb, pose), (&cb, &ca, pose.inverse())] {
+            let mut warm = Warm::default();
+            let cold = convex_gap(one, other, &pose, &mut warm);
+            let again = convex_gap(one, other, &pose, &mut warm);
+            for c in [cold, again] {
+                assert!(c.gap.min <= gap_m + 1e-12 && c.gap.max >= gap_m - 1e-12);
+                if c.gap.min <= 0.0 {
+                    open.push((c.gap, gap_m, a.clone(), b.clone()));
+                }
+            }
+        }
+    }
+    let first = &open[..open.len().min(3)];
+    assert!(open.is_empty(), "{} of 80,000: {first:?}", open.len());
+}

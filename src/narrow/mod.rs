@@ -304,6 +304,7 @@ impl Narrow {
             let hot = &self.hot[slot.index()];
             if hot.live && hot.verdict == Verdict::Possible && !self.memos[slot.index()].queued {
                 self.give_back(slot);
+                self.stirred.set(slot);
                 self.memos[slot.index()].queued = true;
                 self.undecided.push(slot);
             }

@@ -86,6 +86,34 @@ fn law_3_4_a_pair_rule_overrides_the_bodies_and_holds_at_once_for_a_pair_at_rest
     assert_eq!(rig.verdict(1, 2), Verdict::Near);
 }
 
+/// A rule of one body with very many others: they are found within its distance, and its distance widens no other.
+#[test]
+fn bug_a_rule_of_one_body_with_many_widened_the_boxes_of_all() {
+    const MANY: u64 = 4200;
+    const WITHIN_M: f64 = 50.0;
+    let mut balls: Vec<String> = (1..=MANY).map(|id| ball(id, 3.0 * id as f64, "")).collect();
+    balls.push(ball(MANY + 1, 300.0, ""));
+    let mut rig = Rig::new(&scene("", &balls));
+    rig.checked = false;
+    for sides in [["b*", "b4201"], ["b4201", "*"]] {
+        rig.edit(
+            vec![rule(PairAction::Check, sides[0], sides[1], Some(WITHIN_M))],
+            ALL,
+        );
+        for x in [300.0, 6000.5] {
+            rig.move_x(MANY + 1, x);
+            rig.send(ALL);
+            // A touch is nearer than that, too.
+            let apart_m = |id: u64| (3.0 * id as f64 - x).abs() - 2.0;
+            let near = (1..=MANY).filter(|id| apart_m(*id) < WITHIN_M).count() as u64;
+            let tick = rig.out.tick;
+            assert_eq!(tick.near + tick.colliding, near);
+            assert!(tick.candidates < 3 * near, "{} candidates", tick.candidates);
+        }
+    }
+    rig.engine.validate().unwrap();
+}
+
 #[test]
 fn law_3_4_touching_collides_and_is_flagged() {
     let shape = "{ type = \"box\", half_extents = [0.5, 0.5, 0.5] }";

@@ -10,7 +10,8 @@
 //! * Otherwise GJK (`gjk`) finds the closest features, or that the cores overlap. For the least translation an
 //!   expanding polytope (`epa`) follows, or planes through an axis if two axes nearly agree (`revolved`) or one core is
 //!   too close to the axis of a round one for the rim to matter (`sectors`).
-//! * Slivers apart by less than the rounding of those methods are separated by planes along their edges (`part`).
+//! * Slivers apart by less than the rounding of those methods are separated by planes along their edges (`part`), and
+//!   curved pairs apart by less than these end at by cutting planes (`cuts`).
 //! * With circles, both stop early and a Newton method on the features (`newton`) finishes: it finds the normal that
 //!   maximises `f`, outside and inside alike. It starts from the features of the last answer. If these overlap, the
 //!   polytope begins around its closest point, without GJK, or under a cap of directions that the features prove to be
@@ -29,6 +30,7 @@
 //! multiple of the pair's size, so nothing is scaled or cached and no copy of a hull is kept.
 
 mod closed;
+mod cuts;
 mod epa;
 mod feature;
 mod gjk;
@@ -174,6 +176,7 @@ fn gap(
         return finish(&pair, &core, core.along());
     }
     let core = part::part(&pair, iterate(&pair, warm, shell));
+    let core = separate(&pair, core);
     *warm = Warm {
         normal: core.normal,
         held: core.held,
@@ -250,11 +253,28 @@ fn around(pair: &Pair<'_>, warm: Option<&Refined>) -> Option<CoreGap> {
     }
 }
 
+/// Separates a pair whose gap would count as touching, though its interval is wider than rounding, if that is possible.
+fn separate(pair: &Pair<'_>, core: CoreGap) -> CoreGap {
+    let margins = pair.a.margin() + pair.b.margin();
+    let pad = rounding_of(pair, margins);
+    let is_touch = core.lower - margins <= pad && core.upper - margins > -pad;
+    if is_touch && core.upper - core.lower > FINISHED_PADS * pad {
+        cuts::separate(pair, core, margins, pad)
+    } else {
+        core
+    }
+}
+
+/// By how much each end of an interval is moved outward, metres.
+fn rounding_of(pair: &Pair<'_>, margins: f64) -> f64 {
+    pair.pad() + 4.0 * f64::EPSILON * margins
+}
+
 /// From the gap of the cores, with its estimate, to that of the shapes.
 fn finish(pair: &Pair<'_>, core: &CoreGap, estimate: f64) -> Closest {
     let (ra, rb) = (pair.a.margin(), pair.b.margin());
     let margins = ra + rb;
-    let pad = pair.pad() + 4.0 * f64::EPSILON * margins;
+    let pad = rounding_of(pair, margins);
     let low = (core.lower - margins - pad).next_down();
     let high = (core.upper - margins + pad).next_up().max(low);
     let best_m = (estimate - margins).clamp(low, high);
