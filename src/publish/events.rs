@@ -87,6 +87,8 @@ pub(super) struct History {
     pub(super) colliding: bool,
     /// Certified colliding at the poses of the last tick.
     was_colliding: bool,
+    /// Undecided since the last tick in which it was reviewed: nothing has been certified since.
+    open: bool,
     /// The last certified result is a touch during the motion to poses that were not decided.
     on_way: bool,
     /// The last certified result is for poses of an earlier tick, not reported in that tick.
@@ -106,6 +108,7 @@ impl History {
         tick: 0,
         colliding: false,
         was_colliding: false,
+        open: false,
         on_way: false,
         late: false,
         late_begin: 0,
@@ -113,11 +116,15 @@ impl History {
         born: 0,
     };
 
-    /// A pair that was certified colliding or near has stayed so in every tick up to `last`, unless something else was
-    /// certified since: pairs without changes are not reported.
+    /// A pair that was certified colliding or near, or was undecided, has stayed so in every tick up to `last`, unless
+    /// something else was known since: pairs without changes are not reviewed.
     fn go_on_to(&mut self, last: u64) {
-        let stays = matches!(self.verdict, Verdict::Colliding | Verdict::Near);
-        if stays && self.active < last {
+        if self.active >= last {
+            return;
+        }
+        if self.open {
+            self.active = last;
+        } else if matches!(self.verdict, Verdict::Colliding | Verdict::Near) {
             (self.active, self.tick) = (last, last);
         }
     }
@@ -177,11 +184,11 @@ impl Events {
             }
         }
         for &slot in narrow.left() {
-            // Handled by an earlier tick, or nothing certified that could end.
+            // Handled by an earlier tick, or never reviewed.
             if self
                 .histories
                 .get(slot.index())
-                .is_some_and(|history| history.tick != 0)
+                .is_some_and(|history| history.tick != 0 || history.open)
                 && let Some(finding) = narrow.finding(slot)
                 && let (Some(a), Some(b)) = (world.tag(finding.a), world.tag(finding.b))
             {
@@ -303,13 +310,14 @@ impl Events {
                     (history.verdict, history.tick) = (Verdict::Colliding, tick);
                     history.on_way = true;
                 }
+                history.open = true;
                 self.histories[slot.index()] = history;
                 return;
             }
         }
         history.verdict = finding.verdict;
         history.tick = tick;
-        history.on_way = false;
+        (history.open, history.on_way) = (false, false);
         self.histories[slot.index()] = history;
     }
 

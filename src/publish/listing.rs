@@ -27,6 +27,8 @@ pub(super) struct Row {
     pub(super) event: u32,
     /// Number of its contact rows.
     pub(super) contacts: u32,
+    /// First tick without a verdict; 0: decided.
+    pub(super) undecided_since: u64,
     /// Verdict of the pair or of its motion, whichever is worse.
     pub(super) verdict: Verdict,
 }
@@ -58,12 +60,15 @@ impl Row {
         (self.class(), bits ^ ((bits >> 63) & i64::MAX))
     }
 
-    /// Returns whether it can be kept unchanged from the last tick, unless its pair was stirred. Undecided rows age by
-    /// ticks, and an event is over after one.
+    /// Returns whether it can be kept unchanged from the last tick, unless its pair was stirred. An event is over after
+    /// one tick, and so is a row that exists only for it.
     fn may_last(&self) -> bool {
         self.slot.is_some()
             && self.event == NO_EVENT
-            && matches!(self.verdict, Verdict::Colliding | Verdict::Near)
+            && matches!(
+                self.verdict,
+                Verdict::Colliding | Verdict::Possible | Verdict::Near
+            )
     }
 }
 
@@ -307,6 +312,7 @@ mod tests {
             slot: Some(PairSlot(slot)),
             event: NO_EVENT,
             contacts: 0,
+            undecided_since: 0,
             verdict: Verdict::Near,
         }
     }

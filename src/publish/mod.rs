@@ -75,6 +75,8 @@ pub struct Publisher {
     owed: Owed,
     listing: Listing,
     survey: Survey,
+    /// Pairs whose findings were read for their rows in the last tick.
+    pub(crate) reviewed: u64,
     /// Which messages had readers in the last tick.
     heard: Heard,
     kept_pairs: Kept<PairRow>,
@@ -108,6 +110,7 @@ impl Publisher {
             owed: Owed::default(),
             listing: Listing::default(),
             survey: Survey::default(),
+            reviewed: 0,
             heard: Heard::default(),
             kept_pairs: Kept::default(),
             chain: Chain::default(),

@@ -148,6 +148,7 @@ impl Publisher {
             slot,
             event,
             contacts: 0,
+            undecided_since: 0,
             verdict: Verdict::Apart,
         }
     }

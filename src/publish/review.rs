@@ -18,6 +18,7 @@ impl Publisher {
     /// Updates the rows to this tick.
     pub(super) fn review(&mut self, view: &mut View<'_>) {
         self.survey.begin();
+        self.reviewed = 0;
         self.events
             .find_slots(view.tick, view.world, view.pairs, view.narrow);
         self.events
@@ -126,6 +127,7 @@ impl Publisher {
 
     /// Takes what is known about a pair; `None`: it is plainly apart, or gone.
     fn look(&mut self, view: &mut View<'_>, slot: PairSlot) -> Option<Row> {
+        self.reviewed += 1;
         let finding = view.narrow.finding(slot);
         let finding = finding.filter(|finding| finding.verdict != Verdict::Apart)?;
         let (a, b) = (view.world.tag(finding.a)?, view.world.tag(finding.b)?);
@@ -135,7 +137,6 @@ impl Publisher {
         let passage = swept.filter(|passage| self.events.is_news(slot, *passage));
         let row = row_of(view, slot, ids, &finding, passage);
         self.survey.take(&row, passage);
-        self.survey.wait(view.tick, finding.undecided_since);
         view.narrow.told(slot);
         Some(row)
     }
@@ -186,6 +187,7 @@ fn row_of(
         slot: Some(slot),
         event: NO_EVENT,
         contacts: u32::try_from(contacts).unwrap_or(u32::MAX),
+        undecided_since: finding.undecided_since,
         verdict: worst_of(finding.verdict, passage),
     }
 }

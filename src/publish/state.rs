@@ -67,6 +67,32 @@ impl Standing for Width {
     }
 }
 
+/// Since when a pair has had no verdict. Default: it has one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Wait {
+    ids: Ids,
+    /// Its first tick without a verdict; 0: decided.
+    since: u64,
+}
+
+impl Wait {
+    fn of(row: &Row) -> Option<Self> {
+        let (ids, since) = (row.ids, row.undecided_since);
+        (since != 0).then_some(Self { ids, since })
+    }
+}
+
+impl Standing for Wait {
+    fn is_above(&self, other: &Self) -> bool {
+        // 0 is the last.
+        self.since.wrapping_sub(1) < other.since.wrapping_sub(1)
+    }
+
+    fn ids(&self) -> Ids {
+        self.ids
+    }
+}
+
 impl Publisher {
     /// Fills the tick's counts, state, reasons and sources; the engine fills times and units.
     pub(super) fn fill_tick(
@@ -136,7 +162,7 @@ impl Publisher {
             worst_a: worst.ids.0.0,
             worst_b: worst.ids.1.0,
             widest_m: survey.widest.first().width_m,
-            oldest_undecided_ticks: survey.oldest_ticks,
+            oldest_undecided_ticks: survey.oldest_ticks(view.tick),
             reasons,
             sources: sources(view),
             sources_len: u8::try_from(view.world.sources().len()).unwrap_or(u8::MAX),
@@ -169,8 +195,7 @@ fn repeat(header: MessageHeader, state: State, out: &mut Outbox) {
 pub(super) struct Survey {
     worst: Leaders<Worst>,
     widest: Leaders<Width>,
-    /// Age in ticks of the oldest undecided pair.
-    oldest_ticks: u64,
+    oldest: Leaders<Wait>,
     /// Pairs that touched during their motion, and those that may have.
     touched: u64,
     open: u64,
@@ -181,13 +206,14 @@ pub(super) struct Survey {
 impl Survey {
     /// Begins a tick with the rows of the last one.
     pub(super) fn begin(&mut self) {
-        (self.oldest_ticks, self.touched, self.open) = (0, 0, 0);
+        (self.touched, self.open) = (0, 0);
     }
 
     /// Clears all rows.
     pub(super) fn forget(&mut self) {
         self.worst.clear();
         self.widest.clear();
+        self.oldest.clear();
         (self.contacts, self.touched, self.open) = (0, 0, 0);
     }
 
@@ -196,13 +222,17 @@ impl Survey {
         self.contacts -= row.contacts as usize;
         self.worst.leave(&Worst::of(row));
         self.widest.leave(&Width::of(row));
+        if let Some(wait) = Wait::of(row) {
+            self.oldest.leave(&wait);
+        }
     }
 
-    /// Searches the worst pairs and the widest intervals again, if the known ones are gone.
+    /// Searches the worst pairs, the widest intervals and the longest waits again, if the known ones are gone.
     pub(super) fn look_again<'a>(&mut self, rows: impl Iterator<Item = &'a Row>) {
-        if self.worst.are_gone() || self.widest.are_gone() {
+        if self.worst.are_gone() || self.widest.are_gone() || self.oldest.are_gone() {
             self.worst.clear();
             self.widest.clear();
+            self.oldest.clear();
             rows.for_each(|row| self.rank(row));
         }
     }
@@ -224,6 +254,9 @@ impl Survey {
     fn rank(&mut self, row: &Row) {
         self.worst.take(Worst::of(row));
         self.widest.take(Width::of(row));
+        if let Some(wait) = Wait::of(row) {
+            self.oldest.take(wait);
+        }
     }
 
     /// Number of contacts of the pairs.
@@ -237,7 +270,11 @@ impl Survey {
     /// The first difference.
     pub(super) fn validate<'a>(&self, rows: impl Iterator<Item = &'a Row>) -> Result<(), String> {
         let (mut contacts, mut worst, mut widest_m) = (0, Worst::default(), 0.0_f64);
+        let mut oldest = Wait::default();
         for row in rows {
+            oldest = Wait::of(row)
+                .filter(|wait| wait.is_above(&oldest))
+                .unwrap_or(oldest);
             contacts += row.contacts as usize;
             widest_m = widest_m.max(row.gap.width());
             // A row that exists only for its event, or for its motion, is no active pair.
@@ -256,6 +293,13 @@ impl Survey {
                 "the widest interval is {widest_m} m, {kept_m} m kept up"
             ));
         }
+        let kept = self.oldest.first().since;
+        if kept != oldest.since {
+            return Err(format!(
+                "the oldest undecided pair is so since tick {}, {kept} kept up",
+                oldest.since
+            ));
+        }
         let kept = self.worst.first().ids;
         if kept != worst.ids {
             return Err(format!(
@@ -266,10 +310,11 @@ impl Survey {
         Ok(())
     }
 
-    /// Takes since when a pair has had no verdict; 0: it has one.
-    pub(super) fn wait(&mut self, tick: u64, undecided_since: u64) {
-        if undecided_since != 0 {
-            self.oldest_ticks = self.oldest_ticks.max(tick - undecided_since + 1);
+    /// Age of the oldest undecided pair, in ticks; 0: there is none.
+    fn oldest_ticks(&self, tick: u64) -> u64 {
+        match self.oldest.first().since {
+            0 => 0,
+            since => tick - since + 1,
         }
     }
 }

@@ -181,7 +181,11 @@ impl World {
 }
 
 fn engine(clock: &Arc<ManualClock>) -> Engine {
-    let scene = Scene::parse(&scene(), "test", Path::new(".")).unwrap();
+    engine_of(&scene(), clock)
+}
+
+fn engine_of(text: &str, clock: &Arc<ManualClock>) -> Engine {
+    let scene = Scene::parse(text, "test", Path::new(".")).unwrap();
     let shapes = build_shapes(&scene).unwrap();
     let clock = Arc::clone(clock) as Arc<dyn Clock>;
     Engine::new(&scene, shapes.bodies, 7, clock).unwrap()
@@ -243,6 +247,44 @@ fn a_tick_says_the_same_whether_its_rows_are_kept_or_made_anew() {
         rows > 50_000 && cut > 100,
         "{rows} rows, {cut} messages cut"
     );
+}
+
+/// The bodies of a source that is silent for good are undecided for good, and cost the ticks of others nothing.
+#[test]
+fn bug_rows_of_a_dead_source_were_made_anew_in_every_tick() {
+    let clock = Arc::new(ManualClock::new(1_000_000_000));
+    // How far a body may be that has a greatest speed grows with its age.
+    let text = scene().replace("max_speed_mps = 1.0\n", "");
+    let mut engine = engine_of(&text, &clock);
+    let mut world = World::new(3);
+    let mut oldest = 0;
+    for tick in 1..=40 {
+        clock.advance(10_000_000);
+        let inbox = if tick == 1 {
+            world.frames(clock.boottime_ns())
+        } else {
+            Inbox::default()
+        };
+        engine.tick(TickInput {
+            inbox: &inbox,
+            edits: &[],
+            demand: Demand::ALL,
+            budget: Budget::UNLIMITED,
+            cause: TickCause::Heartbeat,
+            cause_source: None,
+            woke_ns: clock.monotonic_ns(),
+            pulse: None,
+        });
+        let row = &engine.out.tick;
+        if tick > 10 {
+            assert!(row.possible > 50, "{} undecided pairs", row.possible);
+            assert_eq!(row.oldest_undecided_ticks, oldest + 1);
+        }
+        oldest = row.oldest_undecided_ticks;
+        if tick > 30 {
+            assert_eq!(engine.publisher.reviewed, 0, "tick {tick}");
+        }
+    }
 }
 
 /// Pairs that were visited when the stamps had these numbers before are visited all the same.

@@ -83,7 +83,7 @@ impl Events {
         let removed = world.changes().removed.iter();
         let removed: BTreeMap<_, _> = removed.map(|gone| (gone.slot, gone.cause)).collect();
         let is_same = |slot: &BodySlot| !removed.contains_key(slot);
-        for lost in std::mem::take(&mut self.adrift) {
+        for mut lost in std::mem::take(&mut self.adrift) {
             let history = lost.history;
             // The slot of a body that left in this tick now holds another body.
             let key = lost.key.filter(|key| {
@@ -107,6 +107,8 @@ impl Events {
                     self.push(history.ids, Some((ticks, cause)), None);
                 }
             } else {
+                // Nothing is known of it in this tick.
+                lost.history.open = true;
                 self.adrift.push(lost);
             }
         }

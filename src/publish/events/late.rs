@@ -22,10 +22,12 @@ impl Events {
         let Some(history) = self.histories.get_mut(slot.index()) else {
             return;
         };
-        // For a pair that the tick did not review nothing was left open.
-        if history.active != tick || history.ids != ids {
+        // Nothing was left open for a pair that is not active in this tick. One that stays undecided is, though it was
+        // not reviewed.
+        if history.ids != ids || (history.active != tick && !history.open) {
             return;
         }
+        history.go_on_to(tick);
         let colliding = match finding.verdict {
             Verdict::Colliding => true,
             Verdict::Near | Verdict::Apart => false,
@@ -39,7 +41,7 @@ impl Events {
         };
         let ticks = Ticks { first, last: tick };
         (history.verdict, history.tick) = (finding.verdict, tick);
-        (history.on_way, history.late) = (false, true);
+        (history.open, history.on_way, history.late) = (false, false, true);
         let was = std::mem::replace(&mut history.colliding, colliding);
         let begins = colliding && !was;
         history.late_begin = if begins { first } else { 0 };

@@ -80,14 +80,19 @@ impl History {
         let Some(finding) = narrow.finding(slot).filter(|_| !narrow.is_stirred(slot)) else {
             return Ok(());
         };
-        let colliding = match finding.verdict {
-            Verdict::Colliding => true,
-            Verdict::Near | Verdict::Apart => false,
-            Verdict::Possible | Verdict::None => return Ok(()),
+        let (a, b, verdict) = (self.ids.0.0, self.ids.1.0, finding.verdict);
+        let colliding = match verdict {
+            Verdict::Colliding => Some(true),
+            Verdict::Near | Verdict::Apart => Some(false),
+            Verdict::Possible | Verdict::None => None,
         };
-        if self.colliding != colliding {
-            let (a, b) = (self.ids.0.0, self.ids.1.0);
-            let verdict = finding.verdict;
+        if self.open != colliding.is_none() {
+            return Err(format!(
+                "{a} and {b} are {verdict}, kept as undecided: {}",
+                self.open
+            ));
+        }
+        if colliding.is_some_and(|colliding| self.colliding != colliding) {
             return Err(format!(
                 "{a} and {b} are {verdict}, certified to collide: {}",
                 self.colliding
@@ -114,7 +119,7 @@ mod tests {
             .unwrap()
     }
 
-    const FAULTS: [Fault; 9] = [
+    const FAULTS: [Fault; 10] = [
         ("one a pair", |events| {
             events.waiting.push(events.waiting[0])
         }),
@@ -136,6 +141,9 @@ mod tests {
         ("of ticks to come", |events| first(events).tick = 2),
         ("certified to collide: false", |events| {
             first(events).colliding = false
+        }),
+        ("kept as undecided: true", |events| {
+            first(events).open = true
         }),
     ];
 

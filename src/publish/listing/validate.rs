@@ -85,6 +85,7 @@ mod tests {
                 slot: Some(PairSlot(u32::try_from(id).unwrap())),
                 event: NO_EVENT,
                 contacts: 0,
+                undecided_since: 0,
                 verdict: Verdict::Near,
             });
         }
