@@ -207,6 +207,20 @@ def test_bug_results_may_be_kept_and_stay_as_they_are(started, topics):
         assert [rows.tobytes() for rows in arrays] == told
 
 
+def test_bug_kept_changes_became_those_of_later_ticks_once_the_client_had_missed_a_message(started):
+    topics = ("changes", "contact_changes")
+    with sweepd.Client(started(MANY), "sim", quat_order="wxyz", listen=topics) as client:
+        kept = client.step(crowd(0), timeout_s=5)
+        arrays = [getattr(kept, topic) for topic in topics]
+        assert all(len(rows) > 0 for rows in arrays)
+        told = [rows.tobytes() for rows in arrays]
+        for topic in topics:
+            client._inbox._renew_list(topic)
+        for step in range(1, 30):
+            client.step(crowd(step), timeout_s=5)
+            assert [rows.tobytes() for rows in arrays] == told
+
+
 def test_a_copy_of_a_result_is_free_of_shared_memory_and_can_be_pickled(started):
     with sweepd.Client(started(MANY), "sim", quat_order="wxyz", listen=("pairs", "changes", "bodies")) as client:
         kept = []

@@ -72,7 +72,7 @@ class _Held:
 
 
 def _view(sample, kind, held):
-    """Rows over a sample, or a copy where others are held."""
+    """Rows over a sample, or a copy where too many others are held, or none may be (``held`` is None)."""
     # the header's count: a slice's own length counted bytes in iceoryx2 0.10.0 (issue 1533)
     count = sample.header.number_of_elements
     if count == 0:
@@ -81,7 +81,7 @@ def _view(sample, kind, held):
         raise SweepdError(f"a message says that it has {count} rows")
     one = _Held(sample, sample.payload_ptr, count, kind)
     rows = np.asarray(one).view(kind)
-    if len(held) >= _HELD_MAX:
+    if held is None or len(held) >= _HELD_MAX:
         rows = rows.copy()
         rows.flags.writeable = False
     else:
@@ -355,7 +355,9 @@ class Ports:
             port = _patiently(lambda: messages().subscriber_builder().create(), until)
         except _FOREIGN as e:
             raise self._unread(topic, e) from e
-        self._readers[topic] = (port, np.dtype(row), header, weakref.WeakSet())
+        # where a port may be reopened nothing is held: the daemon reuses what the old one had received
+        held = None if header is layout.ChangesHeader else weakref.WeakSet()
+        self._readers[topic] = (port, np.dtype(row), header, held)
         self.wake(14)
 
     def _unread(self, topic, e):

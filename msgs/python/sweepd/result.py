@@ -20,7 +20,7 @@ class Result:
       client did not listen or a newer one overtook it. Keep as many results as you like: while three arrays of a kind
       are still there, the next one is a copy.
     * ``changes`` are the rows that changed since the tick before, or the whole list if ``base_tick`` of their
-      ``changes_header`` is 0. They are also None while the list is not whole (yet, or again).
+      ``changes_header`` is 0, in an array of its own. They are also None while the list is not whole (yet, or again).
     * ``contact_changes`` and ``contact_changes_header`` are the same for contacts.
 
     Copies (``copy.deepcopy``) and pickles are whole.
