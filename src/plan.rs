@@ -1,8 +1,8 @@
-//! The plan: which methods a scene gets, and what is left out because it does not need it.
+//! The plan: the methods chosen for a scene, and the parts that it does not need.
 //!
-//! In: the world's bodies, the configuration, who listens and what the broad phase has measured. Out: a [`Plan`] that
-//! `check` prints and the daemon publishes when it changes. It decides again when one of these changes, never in the
-//! middle of a tick.
+//! In: the world's bodies, the configuration, the readers and the measurements of the broad phase. Out: a [`Plan`] that
+//! `check` prints and the daemon publishes when it changes. It is made again when an input changes, never during a
+//! tick.
 
 use serde::Serialize;
 
@@ -17,10 +17,10 @@ mod left_out;
 use facts::Facts;
 pub use facts::Kinds;
 
-/// Up to this many boxes every pair is compared: any structure costs more than it spares below it (24 bodies are 276
+/// Up to this many boxes every pair is compared: for so few, any structure costs more than it saves (24 bodies are 276
 /// comparisons of boxes).
 const BRUTE_FORCE_MAX: usize = 24;
-/// With hysteresis: brute force stays until the scene has grown beyond this.
+/// Hysteresis: brute force is kept until the scene has more boxes than this.
 const BRUTE_FORCE_STAY_MAX: usize = 32;
 
 /// What was chosen for a part, and why.
@@ -45,7 +45,7 @@ pub struct LeftOut {
     pub saved_bytes: u64,
 }
 
-/// Which methods a scene gets, and what is left out.
+/// The methods chosen for a scene, and what is left out.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
     #[serde(skip)]
@@ -69,7 +69,7 @@ pub struct Plan {
     pub left_out: Vec<LeftOut>,
 }
 
-/// What is computed for readers, and whether somebody reads it.
+/// What is computed for readers, and whether there are readers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Readers {
     /// Intervals narrower than a verdict needs: of `pairs`, `changes`, `contacts` or `regions`.
@@ -83,14 +83,14 @@ pub struct Readers {
 /// What is known beside the scene while a daemon runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Seen {
-    /// What somebody has read lately.
+    /// What has been read recently.
     pub readers: Readers,
-    /// The axis that sweep-and-prune leaves out, because it has measured that nearly all overlap on it: 0 to 2.
+    /// The axis that sweep-and-prune skips because it measured that nearly all boxes overlap on it: 0 to 2.
     pub skipped_axis: Option<usize>,
 }
 
 impl Plan {
-    /// The plan for a world as it is now.
+    /// The plan for the current world.
     ///
     /// * `kinds` - those of its bodies.
     #[must_use]
@@ -106,7 +106,7 @@ impl Plan {
         Self::decide(Some(self.method), Facts::of(world, kinds), config, seen)
     }
 
-    /// The plan for the same bodies, where what else it is made for has changed.
+    /// The plan for the same bodies after another input has changed.
     #[must_use]
     pub fn anew(&self, config: &Config, seen: Seen) -> Self {
         Self::decide(Some(self.method), self.facts.clone(), config, seen)

@@ -1,6 +1,6 @@
 //! Clocks, and the work budget of a tick.
 //!
-//! Two clocks: `boottime` for ages (it runs on while the machine is suspended, so old data is seen to be old)
+//! Two clocks: `boottime` for ages (it includes suspended time, so data from before a suspend counts as old)
 //! and `monotonic` for deadlines. Nothing else in the crate reads a clock.
 
 mod meter;
@@ -11,13 +11,13 @@ pub use seldom::Seldom;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Where the engine gets its time from.
+/// The engine's source of time.
 pub trait Clock: Send + Sync {
     /// Nanoseconds on `CLOCK_BOOTTIME`: ages, time-outs.
     fn boottime_ns(&self) -> u64;
     /// Nanoseconds on `CLOCK_MONOTONIC`: deadlines, durations.
     fn monotonic_ns(&self) -> u64;
-    /// Nanoseconds of CPU time of the calling thread: the overshoot that the scheduler has no part in.
+    /// Nanoseconds of CPU time of the calling thread: overshoot without the scheduler's share.
     fn thread_cpu_ns(&self) -> u64;
 }
 
@@ -53,7 +53,7 @@ impl Clock for SystemClock {
     }
 }
 
-/// A clock that tests turn by hand; every read may also advance it by a fixed step.
+/// A clock for tests, advanced explicitly; each read can also advance it by a fixed step.
 #[derive(Debug, Default)]
 pub struct ManualClock {
     now_ns: AtomicU64,
@@ -70,12 +70,12 @@ impl ManualClock {
         }
     }
 
-    /// Lets `ns` nanoseconds pass.
+    /// Advances the clock, nanoseconds.
     pub fn advance(&self, ns: u64) {
         self.now_ns.fetch_add(ns, Ordering::Relaxed);
     }
 
-    /// From now on each read lets `ns` pass, so that a loop which watches the clock sees it run.
+    /// From now on each read advances the clock by `ns` nanoseconds, so that a loop that polls the clock ends.
     pub fn step_each_read(&self, ns: u64) {
         self.step_ns.store(ns, Ordering::Relaxed);
     }
@@ -124,7 +124,7 @@ impl Budget {
         self.time_ns.is_some() || self.units.is_some()
     }
 
-    /// Limited by counted work alone, so that a run replays bit for bit.
+    /// Limited by counted work only, so that a run can be replayed bit for bit.
     #[must_use]
     pub fn units(units: u64) -> Self {
         Self {
@@ -133,7 +133,7 @@ impl Budget {
         }
     }
 
-    /// Limited by wall time alone.
+    /// Limited by wall time only.
     #[must_use]
     pub const fn time_ns(time_ns: u64) -> Self {
         Self {

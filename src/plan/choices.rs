@@ -1,4 +1,4 @@
-//! What is chosen for each part, and why.
+//! The method chosen for each part, and the reason.
 
 use crate::broad::Method;
 use crate::config::{Config, MeshSearch, Viewpoint};
@@ -182,7 +182,7 @@ fn ordered(config: &Config) -> Choice {
     }
 }
 
-/// What is computed because somebody reads it.
+/// What is computed because it has readers.
 fn listened(seen: Seen) -> impl Iterator<Item = Choice> {
     let manifolds = seen.readers.contacts.then_some((
         "contacts",

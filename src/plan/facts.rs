@@ -1,4 +1,4 @@
-//! What a plan looks at: the bodies of a world, counted by kind.
+//! The facts that a plan depends on: the bodies of a world, counted by kind.
 //!
 //! In: a world, and the slots that edits have touched. Out: [`Facts`]. An edit costs what it touches and a look at each
 //! kind, not at each body.
@@ -72,7 +72,7 @@ pub struct Kinds {
 }
 
 impl Kinds {
-    /// Those of a world. Cost: a look at every body.
+    /// The facts of a world. Cost: O(bodies).
     #[must_use]
     pub fn of(world: &World) -> Self {
         let mut kinds = Self::default();
@@ -82,17 +82,17 @@ impl Kinds {
         kinds
     }
 
-    /// Counts anew what the edits of this tick have touched.
+    /// Recounts the bodies that the edits of this tick touched.
     pub fn follow(&mut self, world: &World) {
         for &slot in world.edited_slots() {
             self.set(slot, world.body(slot).map(Kind::of));
         }
     }
 
-    /// Checks that each body counts as what it is, and once.
+    /// Checks that each body is counted once and with its current properties.
     ///
     /// # Errors
-    /// What does not hold.
+    /// The inconsistency found.
     pub fn validate(&self, world: &World) -> Result<(), String> {
         let own = self.of_slot.iter().flatten();
         let counted = own.fold(BTreeMap::new(), |mut counts, kind| {
@@ -195,7 +195,7 @@ impl Kind {
     }
 }
 
-/// A length to three figures: the last bits of a ball around a body are nobody's news.
+/// A length to three significant figures, so that rounding errors of bounding spheres do not change the plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Size {
     /// Decimal exponent of the first figure.
@@ -213,7 +213,7 @@ impl Size {
                 figures: 0,
             };
         }
-        // Of a power of ten the logarithm may be a bit off.
+        // The logarithm of a power of ten may be slightly off.
         let exponent = length_m.log10().floor() as i32;
         let figures = (length_m / 10f64.powi(exponent - 2)).round() as i32;
         match figures {

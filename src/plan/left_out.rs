@@ -1,4 +1,4 @@
-//! What a scene does not need, and what that saves.
+//! The parts that a scene does not need, and the memory that this saves.
 
 use crate::broad::Method;
 use crate::error::counted;
@@ -68,7 +68,7 @@ pub(super) fn of(facts: &Facts, method: Method, seen: Seen) -> Vec<LeftOut> {
     left_out
 }
 
-/// What nobody reads is not computed.
+/// Outputs without readers, which are not computed.
 fn unread(seen: Seen, out: &mut impl FnMut(&'static str, String, u64)) {
     let readers = seen.readers;
     if !readers.bounds {

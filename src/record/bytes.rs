@@ -1,7 +1,7 @@
-//! Numbers as little-endian bytes and back, bit by bit: NaN payloads and -0.0 survive. What is read comes from a file
-//! that may be anything, so that every length is checked before memory is asked for.
+//! Numbers as little-endian bytes and back, bit by bit: NaN payloads and -0.0 survive. The input is an
+//! untrusted file, so every length is checked before memory is allocated.
 
-/// The bytes end before what they say they hold, or hold what has no meaning.
+/// The bytes are truncated or have an invalid value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Damaged;
 
@@ -10,7 +10,7 @@ pub(super) struct Damaged;
 pub(super) struct Take<'a>(pub(super) &'a [u8]);
 
 impl<'a> Take<'a> {
-    /// The next so many.
+    /// The next bytes, of the given number.
     pub(super) fn bytes(&mut self, len: usize) -> Result<&'a [u8], Damaged> {
         let (head, tail) = self.0.split_at_checked(len).ok_or(Damaged)?;
         self.0 = tail;
@@ -27,19 +27,19 @@ impl<'a> Take<'a> {
         Ok(count)
     }
 
-    /// A text or a run of bytes with its length before it.
+    /// A run of bytes, preceded by its length.
     pub(super) fn run(&mut self) -> Result<&'a [u8], Damaged> {
         let len = usize::try_from(u64::take(self)?).map_err(|_| Damaged)?;
         self.bytes(len)
     }
 
-    /// As [`Take::run`], of UTF-8.
+    /// As [`Take::run`], as UTF-8 text.
     pub(super) fn text(&mut self) -> Result<String, Damaged> {
         let text = std::str::from_utf8(self.run()?);
         text.map(ToOwned::to_owned).map_err(|_| Damaged)
     }
 
-    /// That all of it was read.
+    /// Checks that everything was read.
     pub(super) fn end(&self) -> Result<(), Damaged> {
         if self.0.is_empty() {
             Ok(())
@@ -49,34 +49,34 @@ impl<'a> Take<'a> {
     }
 }
 
-/// Writes how many follow. Every list of ours is shorter than 2^32 (see `limits`).
+/// Writes the number of items that follow. Every list is shorter than 2^32 (see `limits`).
 pub(super) fn put_count(len: usize, to: &mut Vec<u8>) {
     u32::try_from(len).unwrap_or(u32::MAX).put(to);
 }
 
-/// Writes a run of bytes with its length before it.
+/// Writes a run of bytes, preceded by its length.
 pub(super) fn put_run(bytes: &[u8], to: &mut Vec<u8>) {
     (bytes.len() as u64).put(to);
     to.extend_from_slice(bytes);
 }
 
-/// Where two values differ first: the path of a field, the one value, the other.
+/// The first difference of two values: the path of the field and both values.
 pub(super) type Differing = (String, String, String);
 
 /// A value of fixed size.
 pub(super) trait Field: Sized {
-    /// Bytes that it takes.
+    /// Its size, bytes.
     const BYTES: usize;
 
-    /// Writes it behind what is there.
+    /// Appends it.
     fn put(&self, to: &mut Vec<u8>);
 
     /// Reads it from the front.
     fn take(from: &mut Take<'_>) -> Result<Self, Damaged>;
 
-    /// Where two of them differ first, by their bits.
+    /// The first difference of two values, compared bit by bit.
     ///
-    /// * `skip` - fields of the outermost row that are not looked at.
+    /// * `skip` - fields of the outermost row that are not compared.
     fn differ(&self, other: &Self, skip: &[&str]) -> Option<Differing>;
 }
 
@@ -141,14 +141,14 @@ impl<T: Field + Copy + Default, const N: usize> Field for [T; N] {
     }
 }
 
-/// Writes a list of rows behind their count.
+/// Writes the number of rows, then the rows.
 pub(super) fn put_rows<T: Field>(rows: &[T], to: &mut Vec<u8>) {
     put_count(rows.len(), to);
     to.reserve(rows.len() * T::BYTES);
     rows.iter().for_each(|row| row.put(to));
 }
 
-/// Reads such a list into memory that is there.
+/// Reads such a list into existing memory.
 pub(super) fn take_rows<T: Field>(from: &mut Take<'_>, into: &mut Vec<T>) -> Result<(), Damaged> {
     into.clear();
     let count = from.count(T::BYTES)?;

@@ -1,9 +1,9 @@
-//! Recording and replay: all that an engine was given and all that it said, in an MCAP file; and the same engine on it
-//! again, compared tick by tick.
+//! Recording and replay: all inputs and outputs of an engine in an MCAP file, and a second run of the engine on these
+//! inputs, compared tick by tick.
 //!
 //! In: a running daemon's ticks, by [`Recorder`]. Out: an MCAP file whose outputs Foxglove and `ros2 bag` can open, and
-//! whose inputs [`Replay`] runs. The engine is a function of its inputs, counted work and the times it was shown; where
-//! a replay differs bit by bit, either the file was changed, or something that is no input had a say in the engine.
+//! whose inputs [`Replay`] runs. The engine is a function of its inputs, counted work and the times it read. If
+//! any bit of a replay differs, either the file was changed, or something that is not an input influenced the engine.
 
 #[cfg(feature = "mcap")]
 mod bytes;

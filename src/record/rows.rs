@@ -34,10 +34,10 @@ macro_rules! rows {
             }
         }
 
-        // Nothing is left out, and nothing lies between.
+        // No field is missing, and there is no padding.
         const _: () = assert!(<$type as Field>::BYTES == size_of::<$type>());
     )+
-        /// What stands in a recording, in words.
+        /// Description of the bytes in a recording.
         #[cfg(test)]
         const WORDS: &str = concat!($(
             stringify!($type), "\n", $("  ", stringify!($field), ": ", stringify!($kind), "\n",)+

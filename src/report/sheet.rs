@@ -1,9 +1,9 @@
-//! A page of HTML that needs nothing but itself: style sheet, head, tables. Light or dark as the reader's system is,
+//! A self-contained page of HTML: style sheet, head, tables. Light or dark according to the reader's system,
 //! and readable on a narrow screen.
 
 use std::fmt::Write as _;
 
-/// Colours are told apart by people who see no red or green, too (Okabe and Ito 2008).
+/// Colours that people with red-green colour blindness can distinguish (Okabe and Ito 2008).
 const STYLE: &str = "
 :root{color-scheme:light dark;--bg:#fff;--fg:#1b1f24;--dim:#5b6470;--rule:#d9dee4;--card:#f7f8fa;--good:#0a6b45;--bad:#b3261e;
 --c0:#0072b2;--c1:#d55e00;--c2:#009e73;--c3:#b5589b;--c4:#9a7d00;--c5:#3a94c9;--c6:#7a4fd0;--c7:#6b7280}
@@ -44,7 +44,7 @@ pub fn page(title: &str, body: &str) -> String {
     )
 }
 
-/// Text that is only text.
+/// Escapes text for HTML.
 #[must_use]
 pub fn escaped(text: &str) -> String {
     let mut clean = String::with_capacity(text.len());
@@ -90,7 +90,7 @@ pub fn figure(title: &str, text: &str, plot: &str) -> String {
     )
 }
 
-/// A count that is to be 0, in the colour of what it is.
+/// A count that should be 0, coloured by whether it is.
 #[must_use]
 pub fn must_be_0(count: &impl std::fmt::Display) -> String {
     let count = count.to_string();

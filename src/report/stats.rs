@@ -1,6 +1,6 @@
-//! Quantiles and means, of what may be nothing.
+//! Quantiles and means of lists that may be empty.
 
-/// The `share` quantile of sorted numbers, the nearest one that there is; `None` of none.
+/// The `share` quantile of sorted numbers, the nearest element; `None` if there are none.
 #[must_use]
 pub fn quantile<T: Copy>(sorted: &[T], share: f64) -> Option<T> {
     let last = sorted.len().checked_sub(1)?;
@@ -14,7 +14,7 @@ pub fn quantile<T: Copy>(sorted: &[T], share: f64) -> Option<T> {
     sorted.get(at).copied()
 }
 
-/// The mean; `None` of none.
+/// The mean; `None` if there are no numbers.
 #[must_use]
 pub fn mean(values: &[f64]) -> Option<f64> {
     #[allow(clippy::cast_precision_loss, reason = "counts far below 2^53")]
@@ -22,7 +22,7 @@ pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / count)
 }
 
-/// A part in parts of the whole; 0 of nothing.
+/// A part as a fraction of the whole; 0 if both are 0.
 #[must_use]
 pub fn share(part: u64, whole: u64) -> f64 {
     #[allow(clippy::cast_precision_loss, reason = "counts far below 2^53")]

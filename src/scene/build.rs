@@ -1,4 +1,4 @@
-//! Builds the shapes of a scene, and says which body a shape's trouble belongs to.
+//! Builds the shapes of a scene, and names the body that a shape's error or warning belongs to.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -12,24 +12,24 @@ use crate::shape::{Library, Shape, ShapeError};
 /// The built shapes of a scene.
 #[derive(Debug)]
 pub struct BuiltShapes {
-    /// `[body][shape]`, beside `Scene::bodies` and their `shapes`.
+    /// `[body][shape]`, indexed as `Scene::bodies` and their `shapes`.
     pub shapes: Vec<Vec<Arc<Shape>>>,
-    /// Things to know, one line each, naming file, line and body; each shape is spoken of once.
+    /// Warnings, one line each, with file, line and body. A shared shape is reported once, for its first body.
     pub warnings: Vec<String>,
-    /// What was settled where the scene does not say it, one line each, as the warnings.
+    /// Choices made where the scene does not specify them, one line each, in the format of the warnings.
     pub notes: Vec<String>,
 }
 
-/// Where a shape is spoken of, its warnings, its note, and how many more bodies have it.
+/// Prefix of a shape's messages, its warnings, its note, and the number of further uses of it.
 type Spoken = (String, Vec<String>, Option<&'static str>, usize);
 
 impl Scene {
     /// Builds all shapes; equal ones are shared.
     ///
-    /// * `progress` - told after each body: how many are done, of how many.
+    /// * `progress` - called after each body with the number of bodies done and the total.
     ///
     /// # Errors
-    /// `Error::Scene` with file, line, body and the mend, at the first shape that cannot be built.
+    /// `Error::Scene` with file, line, body and the fix, at the first shape that cannot be built.
     pub fn build_shapes(
         &self,
         library: &mut Library,
@@ -40,7 +40,7 @@ impl Scene {
             warnings: Vec::new(),
             notes: Vec::new(),
         };
-        // By address of the shared shape: its first body, its warnings and note, how many more bodies have it.
+        // By address of the shared shape.
         let mut spoken: BTreeMap<usize, Spoken> = BTreeMap::new();
         let mut order = Vec::new();
         for (place, body) in self.bodies.iter().enumerate() {
@@ -88,9 +88,9 @@ impl Scene {
         Ok(all)
     }
 
-    /// A shape's trouble with file, line and body.
+    /// The error of a shape, prefixed with file, line and body.
     ///
-    /// * `body`, `shape` - places in `Scene::bodies` and its `shapes`.
+    /// * `body`, `shape` - indices into `Scene::bodies` and its `shapes`.
     #[must_use]
     pub fn shape_error(&self, body: usize, shape: usize, error: &ShapeError) -> Error {
         Error::Scene(format!("{}{error}", self.prefix(body, shape)))
@@ -120,7 +120,7 @@ impl Scene {
         text
     }
 
-    /// The files of its meshes, each once.
+    /// Paths of its mesh files, without duplicates.
     #[must_use]
     pub fn mesh_files(&self) -> Vec<PathBuf> {
         let shapes = self.bodies.iter().flat_map(|body| &body.shapes);
@@ -129,7 +129,7 @@ impl Scene {
         files.into_iter().map(|file| base.join(file)).collect()
     }
 
-    /// The body of a name.
+    /// The body with this name.
     ///
     /// Cost: O(bodies).
     #[must_use]

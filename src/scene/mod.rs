@@ -1,7 +1,7 @@
-//! Scenes: which bodies, sources and pair rules there are, and how the daemon runs them.
+//! Scenes: the bodies, sources and pair rules, and the settings of the daemon that runs them.
 //!
-//! In: a TOML file (strict). Out: a checked [`Scene`]; every error names file, line, body and the mend. Requests to
-//! edit a running scene come in as JSON of the same words, and change a scene as a whole or not at all.
+//! In: a TOML file (unknown keys are errors). Out: a checked [`Scene`]; every error names file, line, body and the fix.
+//! Requests to edit a running scene are JSON with the same keys; a request is applied as a whole or not at all.
 
 mod build;
 mod model;

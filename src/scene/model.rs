@@ -10,28 +10,28 @@ use crate::shape::ShapeSpec;
 /// A checked scene: names are unique, numbers finite, references resolve.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
-    /// Name of the one frame all poses are in.
+    /// Name of the frame that all poses are given in.
     pub frame_id: String,
     /// Mode, budget, heartbeat, limits.
     pub config: Config,
     /// Sources, at most 16.
     pub sources: Vec<SourceSpec>,
-    /// Bodies, in the file's order.
+    /// Bodies, in the order of the file.
     pub bodies: Vec<BodySpec>,
-    /// Pair rules; the last that matches wins.
+    /// Pair rules; the last one that matches applies.
     pub rules: Vec<PairRule>,
-    /// Where it was read from, for paths and messages.
+    /// Where it was read from; used for mesh paths and in messages.
     pub origin: Origin,
 }
 
 /// Where a scene was read from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
-    /// The file's path, as messages name it; empty for a scene that was not read from a file.
+    /// Path of the file as shown in messages; empty if the scene was not read from a file.
     pub file: String,
     /// The folder that mesh files are relative to.
     pub base: PathBuf,
-    /// `[body][shape]`, beside `Scene::bodies`: the line of each shape, from 1; shorter where bodies were put later.
+    /// `[body][shape]`, indexed as `Scene::bodies`: line of each shape, from 1. Bodies added later have no entry.
     pub shape_lines: Vec<Vec<u32>>,
 }
 
@@ -40,11 +40,11 @@ pub struct Origin {
 pub struct SourceSpec {
     /// Unique, 1 to 31 bytes.
     pub name: String,
-    /// Without a frame for this long it is no longer alive and its bodies are stale, nanoseconds.
+    /// After this time without a frame it is no longer alive and its bodies are stale, nanoseconds.
     pub timeout_ns: u64,
-    /// What happens to its bodies that are too old, where they do not say it themselves.
+    /// What happens to its stale bodies, unless a body has its own setting.
     pub on_stale: OnStale,
-    /// Which ROS 2 topics it is; `None`: a client over shared memory or on `~/transforms`.
+    /// The ROS 2 topics it consists of; `None`: a client over shared memory or on `~/transforms`.
     pub ros2: Option<RosSource>,
 }
 
@@ -53,51 +53,51 @@ pub struct SourceSpec {
 pub struct BodySpec {
     /// Unique, 1 to 104 bytes.
     pub name: String,
-    /// Unique, never 0: as given, or the least free one in the file's order.
+    /// Unique, never 0: as given, or else the least free one, assigned in the order of the file.
     pub id: BodyId,
     /// At least one.
     pub shapes: Vec<PlacedSpec>,
-    /// Start pose in the scene's frame; relative to the body it is attached to, where it is.
+    /// Start pose in the scene's frame, or in the frame of the body it is attached to, if any.
     pub pose: Pose,
-    /// Whether frames may move it. A body that moves is not known before its first pose.
+    /// Whether frames may move it. The pose of a moving body is unknown until a frame has given one.
     pub moves: bool,
     /// Whether its source sends vertices of its one triangle mesh.
     pub deforms: bool,
     /// Whether it is swept between its last two poses.
     pub continuous: bool,
-    /// A longer step of its centre between two frames is a teleport, which is not swept, metres; `None`: no step is.
+    /// A longer step of its centre between two frames is a teleport and is not swept, metres; `None`: no step is one.
     pub teleport_m: Option<f64>,
-    /// Place of its source in `Scene::sources`. `None` when it cannot move; an attached body may have none too, and
-    /// then no frame moves it after it is detached.
+    /// Index of its source in `Scene::sources`. `None` if it cannot move. An attached body may also have none; then no
+    /// frame moves it after it is detached.
     pub source: Option<usize>,
-    /// Its frame, where its source is of kind `tf`; `None`: its name.
+    /// Its ROS 2 frame if its source is of kind `tf`; `None`: its name.
     pub ros_frame: Option<String>,
-    /// Its topic, where its source is of kind `pose` or `odometry`.
+    /// Its topic if its source is of kind `pose` or `odometry`.
     pub ros_topic: Option<String>,
     /// Groups it belongs to, one bit each.
     pub group: u32,
     /// Groups it collides with.
     pub mask: u32,
-    /// Its neighbour, by name: ignored by default.
+    /// Name of its neighbour; the pair of the two is ignored by default.
     pub parent: Option<String>,
-    /// The body it takes pose, age and unknown from, by name.
+    /// Name of the body it is attached to, which determines its pose, its age and whether its pose is unknown.
     pub attached_to: Option<String>,
-    /// Bodies of one rigid group never move relative to each other and are ignored.
+    /// Bodies of one rigid group never move relative to each other; their pairs are ignored.
     pub rigid_group: Option<String>,
     /// Pairs nearer than this are reported, metres.
     pub report_within_m: f64,
-    /// Greatest speed of any of its surface points, metres a second.
+    /// Greatest speed of any of its surface points, metres per second.
     pub max_speed_mps: Option<f64>,
-    /// Weight of its pairs in the order of work, `limits::PRIORITY_MIN` to `PRIORITY_MAX`; 1: as any other.
+    /// Weight of its pairs in the order of work, `limits::PRIORITY_MIN` to `PRIORITY_MAX`; 1: the default.
     pub priority: f64,
-    /// What happens when it is too old; `None`: what its source says.
+    /// What happens when it is stale; `None`: the setting of its source.
     pub on_stale: Option<OnStale>,
-    /// Whether it takes part.
+    /// Whether it takes part in collision checks.
     pub enabled: bool,
 }
 
 impl BodySpec {
-    /// A body as a scene file gives it that names no more of it, before it has a source.
+    /// A body with the defaults of a scene file for everything else, and without a source.
     #[must_use]
     pub fn new(name: String, id: BodyId, shapes: Vec<PlacedSpec>) -> Self {
         Self {
@@ -125,7 +125,7 @@ impl BodySpec {
         }
     }
 
-    /// Whether another says the same of everything but the id and the shapes.
+    /// Returns whether the two are equal except for ids and shapes.
     #[must_use]
     pub(crate) fn reads_as(&self, other: &Self) -> bool {
         let Self {
@@ -172,7 +172,7 @@ impl BodySpec {
     }
 }
 
-/// A shape at its place in a body.
+/// A shape and its pose in a body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacedSpec {
     /// The shape.
@@ -181,10 +181,10 @@ pub struct PlacedSpec {
     pub pose: Pose,
 }
 
-/// What a pair rule says.
+/// What a pair rule does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PairAction {
-    /// Check the pair, whatever masks and neighbours say.
+    /// Check the pair, regardless of masks and neighbours.
     Check,
     /// Never check it.
     Ignore,
@@ -195,11 +195,11 @@ pub enum PairAction {
 pub struct PairRule {
     /// Check or ignore.
     pub action: PairAction,
-    /// The one side.
+    /// Name or pattern of one side.
     pub a: String,
-    /// The other side.
+    /// Name or pattern of the other side.
     pub b: String,
-    /// Why; shown by `check`.
+    /// The reason for the rule; shown by `check`.
     pub reason: String,
     /// Overrides the bodies' `report_within_m` for these pairs.
     pub report_within_m: Option<f64>,

@@ -1,25 +1,25 @@
-//! One tree for both scene languages: TOML files (each value knows its byte offset) and JSON requests.
+//! One tree type for both scene languages: TOML files, with the byte offset of each value, and JSON requests.
 //!
-//! In: text. Out: a [`Node`], from which the readers take what they know. Serde types of the scene would lose the place
-//! of a value inside a shape (a tagged enum is buffered first), and so the line of the mistake.
+//! In: text. Out: a [`Node`], from which the readers take the keys they know. Deserializing a scene with Serde directly
+//! would lose the offset of a value inside a shape (Serde buffers a tagged enum), and so the line of the mistake.
 
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// What is wrong, and where; the reader at the door turns the place into a line.
+/// What is wrong, and where; the reader of the file converts the byte offset into a line.
 #[derive(Debug)]
 pub(crate) struct Fault {
     /// Byte offset in the file; `None` in JSON.
     pub(crate) at: Option<usize>,
-    /// What, and what to change.
+    /// What is wrong, and what to change.
     pub(crate) text: String,
-    /// Another place that the text ends with (`first at line ..`).
+    /// Byte offset of a second place, which is appended to the text (`first at line ..`).
     pub(crate) other: Option<usize>,
 }
 
 impl Fault {
-    /// A mistake at a place.
+    /// A mistake at a byte offset.
     pub(crate) fn new(at: Option<usize>, text: impl Into<String>) -> Self {
         Self {
             at,
@@ -28,20 +28,20 @@ impl Fault {
         }
     }
 
-    /// Names another place beside it.
+    /// Adds the byte offset of a second place.
     pub(crate) fn with_other(mut self, other: Option<usize>) -> Self {
         self.other = other;
         self
     }
 
-    /// Says in which body, shape or rule it is.
+    /// Prefixes the text with the body, shape or rule that it is in.
     pub(crate) fn within(mut self, context: &str) -> Self {
         self.text = format!("{context}: {}", self.text);
         self
     }
 }
 
-/// A value and its place.
+/// A value and its byte offset.
 #[derive(Debug)]
 pub(crate) struct Node {
     /// Byte offset in the file; `None` in JSON.
@@ -50,23 +50,23 @@ pub(crate) struct Node {
     pub(crate) value: Value,
 }
 
-/// The values both languages have.
+/// The values of both languages.
 #[derive(Debug)]
 pub(crate) enum Value {
     Null,
     Flag(bool),
     Whole(i64),
-    /// A whole number beyond i64.
+    /// A whole number that does not fit in i64.
     Large(u64),
     Real(f64),
     Text(String),
     List(Vec<Node>),
     Table(Vec<Entry>),
-    /// A date, which no key takes.
+    /// A date; no key accepts one.
     Date,
 }
 
-/// A key, its place and its value.
+/// A key, its byte offset and its value.
 #[derive(Debug)]
 pub(crate) struct Entry {
     pub(crate) key: String,
@@ -75,7 +75,7 @@ pub(crate) struct Entry {
 }
 
 impl Node {
-    /// What kind of value it is, for messages.
+    /// The kind of its value, for messages.
     pub(crate) fn kind(&self) -> &'static str {
         match self.value {
             Value::Null => "null",
@@ -89,7 +89,7 @@ impl Node {
         }
     }
 
-    /// The text under a key of a table, to name a thing before it is read.
+    /// The text at a key of a table; used to name an item before it is read.
     pub(crate) fn peek_text(&self, key: &str) -> Option<&str> {
         let Value::Table(entries) = &self.value else {
             return None;
@@ -105,7 +105,7 @@ impl Node {
     pub(crate) fn from_toml(text: &str) -> Result<Self, Fault> {
         let table = DeTable::parse(text).map_err(|e| {
             let at = e.span().map(|span| span.start);
-            // The parser's messages can be of several lines; one line is one error.
+            // The parser's messages can have several lines; an error is one line.
             let message = e.message().split_whitespace().collect::<Vec<_>>().join(" ");
             Fault::new(at, format!("this is not TOML: {message}"))
         })?;
@@ -122,7 +122,7 @@ impl Node {
                 node: Self::value(value)?,
             });
         }
-        // The parser sorts by key; errors are told in the order of the file.
+        // The parser sorts by key; errors are reported in the order of the file.
         entries.sort_by_key(|entry| entry.at);
         Ok(Self {
             at: Some(at),
@@ -169,7 +169,7 @@ impl Node {
         })
     }
 
-    /// Reads a JSON text; a doubled key is an error, as it is in TOML.
+    /// Reads a JSON text; a duplicate key is an error, as in TOML.
     pub(crate) fn from_json(json: &[u8]) -> Result<Self, Fault> {
         serde_json::from_slice(json).map_err(|e| Fault::new(None, format!("this is not JSON: {e}")))
     }
@@ -226,7 +226,7 @@ impl<'de> Visitor<'de> for ValueVisitor {
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Value, A::Error> {
         let mut entries: Vec<Entry> = Vec::new();
         while let Some(key) = map.next_key::<String>()? {
-            // Tables have a dozen known keys; a longer one is refused as soon as it is read, so this stays cheap.
+            // Linear search: a table with more than KEYS_MAX keys is refused while it is read, so this stays cheap.
             if entries.len() > KEYS_MAX || entries.iter().any(|entry| entry.key == key) {
                 let text = format!("the key `{key}` is doubled, or one of too many: remove it");
                 return Err(serde::de::Error::custom(text));
@@ -242,7 +242,7 @@ impl<'de> Visitor<'de> for ValueVisitor {
     }
 }
 
-/// Keys of one JSON table: no table of a request knows more than 20.
+/// A JSON table with more keys is refused; no table of a request has more than 20 known keys.
 const KEYS_MAX: usize = 64;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Things to know about a scene that are no mistakes: what `check` prints beside its errors.
+//! Notes on a scene that are not errors; `check` prints them in addition to its errors.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::scene::{BodySpec, PairRule, Scene, is_pattern, pattern_matches};
 use crate::shape::ShapeSpec;
 
 impl PairRule {
-    /// Whether it speaks of the pair of these two names, either way round.
+    /// Whether it matches the pair of these two names, in either order.
     #[must_use]
     pub fn matches(&self, one: &str, other: &str) -> bool {
         (pattern_matches(&self.a, one) && pattern_matches(&self.b, other))
@@ -17,8 +17,8 @@ impl PairRule {
 }
 
 impl BodySpec {
-    /// Whether one of its shapes is a half-space: it has no box, and is paired with every body that is
-    /// not half-spaces alone.
+    /// Whether one of its shapes is a half-space. Such a body has no bounding box and is paired with every body that
+    /// does not consist of half-spaces only.
     #[must_use]
     pub fn is_unbounded(&self) -> bool {
         let is_half_space = |shape: &ShapeSpec| matches!(shape, ShapeSpec::HalfSpace { .. });
@@ -37,7 +37,7 @@ impl BodySpec {
 }
 
 impl Scene {
-    /// The rule that decides about a pair of names: the last that matches.
+    /// The rule that applies to a pair of names: the last one that matches.
     ///
     /// Cost: O(rules x names); for listings, not for ticks.
     #[must_use]
@@ -48,8 +48,8 @@ impl Scene {
             .find(|rule| rule.matches(one, other))
     }
 
-    /// What is odd but legal, one sentence each: nothing to watch, rules and sources without a body, half-spaces,
-    /// continuous bodies, what is never read.
+    /// What is legal but unusual, one sentence each: nothing to check, rules and sources without a body, half-spaces,
+    /// continuous bodies, settings without effect.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
@@ -106,7 +106,7 @@ impl Scene {
         }
     }
 
-    /// What is said and never read.
+    /// Adds notes on settings that have no effect.
     fn note_unread(&self, notes: &mut Vec<String>) {
         let unread = |body: &&BodySpec| body.teleport_m.is_some() && !body.continuous;
         if let Some(body) = self.bodies.iter().find(unread) {

@@ -1,4 +1,4 @@
-//! Names and patterns: `*` stands for any run of characters (also none), `?` for exactly one.
+//! Names and patterns: `*` matches any run of characters (also an empty one), `?` exactly one.
 
 /// Whether `name` matches `pattern`; case matters, and without `*` and `?` it is equality.
 ///
@@ -8,7 +8,7 @@
 #[must_use]
 pub fn pattern_matches(pattern: &str, name: &str) -> bool {
     let (mut pattern, mut name) = (pattern.chars(), name.chars());
-    // Where to go on when a guess fails: behind the last `*`, with one more character given to it.
+    // Where to continue after a mismatch: after the last `*`, which then matches one more character.
     let mut point_of_return = None;
     loop {
         let name_here = name.clone();
@@ -34,7 +34,7 @@ pub fn pattern_matches(pattern: &str, name: &str) -> bool {
     }
 }
 
-/// The characters that every match begins with, and those that it ends with.
+/// The literal characters that every match begins with, and those that it ends with.
 pub(crate) fn literal_ends(pattern: &str) -> (&str, &str) {
     let mut head = pattern.split(['*', '?']);
     let mut tail = pattern.rsplit(['*', '?']);

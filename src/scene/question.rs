@@ -1,7 +1,7 @@
-//! Questions to a running daemon, each the one key of a request; none changes anything.
+//! Questions to a running daemon. A question is the only key of its request and changes nothing.
 //!
-//! In: JSON in the words of scene files. Out: a checked [`Question`]; whether its names are those of bodies is seen
-//! where it is answered.
+//! In: JSON with the keys of scene files. Out: a checked [`Question`]; whether its names are those of bodies is checked
+//! when it is answered.
 //!
 //! ```json
 //! { "gap": { "a": "box", "b": "part" } }
@@ -20,24 +20,24 @@ use crate::scene::read_shape::read_pose;
 use crate::scene::request::need_name;
 use crate::scene::table::Table;
 
-/// Most that a component of a velocity is in a question, metres a second: nothing that is meant flies faster.
+/// Largest component of a velocity in a question, metres per second: a larger one is a mistake.
 const SPEED_MAX_MPS: f64 = 1e6;
-/// Most that a component of an angular velocity is in a question, radians a second: nothing that is meant turns faster.
+/// Largest component of an angular velocity in a question, radians per second: a larger one is a mistake.
 const SPIN_MAX_RADPS: f64 = 1e6;
-/// Longest time ahead that a question asks of, seconds: nothing is known of a motion for so long.
+/// Longest time ahead in a question, seconds: no motion is known for longer.
 const WITHIN_MAX_S: f64 = 1e5;
 
-/// The keys that ask.
+/// The keys that are questions.
 pub(super) const QUESTIONS: &[&str] = &["gap", "touching", "ray", "impact"];
 
-/// What is asked of a running daemon.
+/// A question to a running daemon.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Question {
     /// The gap of two bodies.
     Gap {
-        /// Name of the one.
+        /// Name of one body.
         a: String,
-        /// Name of the other.
+        /// Name of the other body.
         b: String,
     },
     /// What a body or a shape touches, or would touch.
@@ -48,62 +48,62 @@ pub enum Question {
     Impact(Impact),
 }
 
-/// Two bodies on their way.
+/// Two bodies and their velocities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Impact {
-    /// Name of the one.
+    /// Name of one body.
     pub a: String,
-    /// Name of the other.
+    /// Name of the other body.
     pub b: String,
-    /// How the one moves.
+    /// Velocity of `a`.
     pub velocity_a: Velocity,
-    /// How the other moves.
+    /// Velocity of `b`.
     pub velocity_b: Velocity,
-    /// How far ahead it is looked, seconds.
+    /// Time ahead that is searched, seconds.
     pub within_s: f64,
 }
 
-/// How a body moves; where nothing is said, as its source says.
+/// Velocity of a body; a missing part is taken from its source.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Velocity {
-    /// Of its frame's origin, scene frame, metres a second.
+    /// Velocity of its frame's origin, scene frame, metres per second.
     pub linear: Option<[f64; 3]>,
-    /// Scene frame, radians a second.
+    /// Angular velocity, scene frame, radians per second.
     pub angular: Option<[f64; 3]>,
 }
 
 /// A ray.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ray {
-    /// Where it begins, scene frame, metres.
+    /// Its start, scene frame, metres.
     pub from: [f64; 3],
-    /// Where it goes, scene frame; of any length but 0.
+    /// Its direction, scene frame; any length except 0.
     pub direction: [f64; 3],
-    /// How far it goes, metres.
+    /// Its length, metres.
     pub max_m: f64,
-    /// Bodies of one of these groups are looked at.
+    /// Only bodies in one of these groups are tested.
     pub mask: u32,
 }
 
 /// What touches a body or a shape, or would if it were at a pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Touching {
-    /// What is put there.
+    /// The body or shapes.
     pub subject: Subject,
-    /// Where, in the scene's frame; `None`: where the body is, or the scene's frame itself for a shape.
+    /// Its pose in the scene's frame; `None`: the body's current pose, or the identity for shapes.
     pub pose: Option<Pose>,
-    /// What is nearer than this is told, too, metres.
+    /// Bodies nearer than this are reported too, metres.
     pub within_m: f64,
-    /// Whether the scene's filters hold.
+    /// Whether the scene's filters apply.
     pub filters: bool,
 }
 
-/// What is put somewhere.
+/// What is tested at a pose.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Subject {
-    /// A body of the scene, by name, with what hangs on it.
+    /// Name of a body of the scene; the bodies attached to it are included.
     Body(String),
-    /// What is no body.
+    /// Shapes that belong to no body.
     Shapes {
         /// At least one.
         shapes: Vec<PlacedSpec>,
@@ -115,7 +115,7 @@ pub enum Subject {
 }
 
 impl Question {
-    /// The shapes that are to be built before it can be answered.
+    /// The shapes that must be built before it can be answered.
     #[must_use]
     pub fn shapes(&self) -> &[PlacedSpec] {
         match self {
@@ -130,7 +130,7 @@ impl Question {
 
 /// Reads the value of a question's key.
 ///
-/// * `blobs` - the bytes behind the JSON of the request.
+/// * `blobs` - the bytes after the JSON of the request.
 pub(super) fn read_question(kind: &str, node: Node, blobs: &[u8]) -> Result<Question, Fault> {
     match kind {
         "touching" => read_touching(node, blobs).map(Question::Touching),
@@ -186,7 +186,7 @@ fn read_ray(node: Node) -> Result<Ray, Fault> {
     };
     let (from, direction) = (need("from")?, need("direction")?);
     if let Some(far) = from.iter().find(|x| x.abs() > COORDINATE_MAX_M) {
-        let text = format!("from holds {far} m: stay within {COORDINATE_MAX_M:e} m");
+        let text = format!("from holds {far:e} m: stay within {COORDINATE_MAX_M:e} m");
         return Err(Fault::new(None, text));
     }
     if direction.iter().all(|x| *x == 0.0) {
@@ -219,7 +219,7 @@ fn read_impact(node: Node) -> Result<Impact, Fault> {
         let far = triple.and_then(|v| v.into_iter().find(|x| x.abs() > most));
         match far {
             Some(far) => {
-                let text = format!("{key} holds {far}: stay within {most:e}");
+                let text = format!("{key} holds {far:e}: stay within {most:e}");
                 Err(Fault::new(None, text))
             }
             None => Ok(triple),

@@ -22,15 +22,15 @@ pub(crate) const ROS_NAME_BYTES_MAX: usize = 255;
 /// A body as written: checked by itself, its references not yet resolved.
 #[derive(Debug)]
 pub struct BodyDraft {
-    /// What is said of it. `source` is `None` and `id` is 0 until they are settled.
+    /// Its properties. `source` is `None`, and an id that was not given is 0, until they are resolved.
     pub(crate) spec: BodySpec,
     /// Its source, by name.
     pub(crate) source: Option<String>,
-    /// Places of its keys in the file.
+    /// Byte offsets of its keys in the file.
     pub(crate) places: Places,
 }
 
-/// Byte offsets of what messages point at; all `None` in a request.
+/// Byte offsets of the keys that messages refer to; all `None` in a request.
 #[derive(Debug, Default)]
 pub(crate) struct Places {
     pub(crate) name: Option<usize>,
@@ -67,7 +67,7 @@ const KEYS: &[&str] = &[
     "shape",
 ];
 
-/// What a body is called in messages: by name, or by its place in the list, from 1.
+/// The body in messages: its name, or its position in the list, from 1.
 pub(crate) fn title(node: &Node, nth: usize) -> String {
     match node.peek_text("name") {
         Some(name) => format!("body \"{}\"", shortened(name)),
@@ -77,7 +77,7 @@ pub(crate) fn title(node: &Node, nth: usize) -> String {
 
 /// Reads a body.
 ///
-/// * `blobs` - the bytes behind the JSON of a request; `None` for a scene file.
+/// * `blobs` - the bytes after the JSON of a request; `None` for a scene file.
 pub(crate) fn read_body(node: Node, blobs: Option<&[u8]>) -> Result<BodyDraft, Fault> {
     let at = node.at;
     let mut table = Table::open(node, "a body", KEYS)?;
@@ -97,7 +97,7 @@ pub(crate) fn read_body(node: Node, blobs: Option<&[u8]>) -> Result<BodyDraft, F
     let Some(name) = table.name("name", BODY_NAME_BYTES_MAX)? else {
         return Err(Fault::new(at, "a body needs `name`: add it"));
     };
-    // TOML has no whole numbers beyond i64; requests have.
+    // Ids may be larger than i64 holds.
     let id = table.whole("id", 1, u64::MAX)?.unwrap_or(0);
     let pose = read_pose(&mut table)?;
     let moves = table.flag("moves")?.unwrap_or(true);
@@ -143,7 +143,7 @@ pub(crate) fn read_body(node: Node, blobs: Option<&[u8]>) -> Result<BodyDraft, F
     })
 }
 
-/// What a body that deforms cannot be beside.
+/// Checks that a deforming body has no property that excludes deforming.
 fn check_deforms(spec: &BodySpec) -> Result<(), &'static str> {
     if !spec.deforms {
         return Ok(());
@@ -174,7 +174,7 @@ fn check_deforms(spec: &BodySpec) -> Result<(), &'static str> {
     Ok(())
 }
 
-/// What happens to what is too old.
+/// Reads what happens to stale bodies.
 pub(super) fn read_on_stale(table: &mut Table) -> Result<Option<OnStale>, Fault> {
     let at = table.at("on_stale");
     let Some(word) = table.text("on_stale")? else {

@@ -1,6 +1,6 @@
-//! What a scene says of ROS 2: which sources are topics of common types, and which frame or topic a body has there.
+//! ROS 2 in a scene: which sources are topics of common types, and which frame or topic belongs to a body.
 //!
-//! In: the `ros2` table of a source, the `ros_frame` and `ros_topic` of bodies. Out: [`RosSource`], or the mend.
+//! In: the `ros2` table of a source, the `ros_frame` and `ros_topic` of bodies. Out: [`RosSource`], or an error.
 
 use std::collections::BTreeMap;
 
@@ -56,7 +56,7 @@ pub(crate) fn read_ros(node: Option<Node>) -> Result<Option<RosSource>, Fault> {
     }))
 }
 
-/// Takes the name of a topic out.
+/// Takes the name of a topic from a table.
 pub(crate) fn read_topic(table: &mut Table, key: &str) -> Result<Option<String>, Fault> {
     let at = table.at(key);
     match table.name(key, ROS_NAME_BYTES_MAX)? {
@@ -68,7 +68,7 @@ pub(crate) fn read_topic(table: &mut Table, key: &str) -> Result<Option<String>,
     }
 }
 
-/// Why a source of topics cannot lead in lockstep.
+/// The message for a source of topics that is set to lead in lockstep, which it cannot.
 pub(crate) fn no_lockstep(name: &str) -> String {
     format!(
         "on_frame names source \"{}\", whose poses come from ROS 2 topics body by body, so that no message of theirs is a whole frame: write mode = \"on_all\" or rate = HZ, or send `~/transforms` and take `ros2` out of the source",
@@ -76,9 +76,9 @@ pub(crate) fn no_lockstep(name: &str) -> String {
     )
 }
 
-/// Whether a body says what its source needs: nothing, a frame, or a topic of its own.
+/// Checks that a body has what its source needs: nothing, a frame, or its own topic.
 ///
-/// * `topics` - the topics that bodies have already, and whose.
+/// * `topics` - the topics of the bodies so far, and their bodies.
 pub(crate) fn check_ros(
     draft: &BodyDraft,
     sources: &[SourceSpec],

@@ -1,6 +1,6 @@
-//! Reads a scene file: sources, bodies, rules and how the daemon runs.
+//! Reads a scene file: sources, bodies, rules and the settings of the daemon.
 //!
-//! In: TOML text. Out: a checked [`Scene`], or one error that names file, line, body and the mend.
+//! In: TOML text. Out: a checked [`Scene`], or one error that names file, line, body and the fix.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::scene::table::{Table, list, mend_name, shortened};
 use crate::scene::{Origin, Scene, SourceSpec};
 use crate::time::Budget;
 
-/// Longest time that a setting can name, milliseconds: a day.
+/// Longest time in a setting, milliseconds: one day.
 const TIME_MS_MAX: f64 = 86_400_000.0;
 /// Longest `frame_id`, bytes.
 const FRAME_ID_BYTES_MAX: usize = 63;
@@ -57,12 +57,12 @@ impl Scene {
     /// Reads and checks a scene file; mesh files must exist, and are read when shapes are built.
     ///
     /// # Errors
-    /// `Error::Scene` with file, line, body and the mend, at the first mistake, or when the file itself cannot be read.
+    /// `Error::Scene` with file, line, body and the fix, at the first mistake, or if the file cannot be read.
     pub fn load(path: &Path) -> Result<Self> {
         Self::parse_at(&Self::read_text(path)?, path)
     }
 
-    /// As [`Scene::parse`], of the text of the file at `path`.
+    /// As [`Scene::parse`], with the text of the file at `path`.
     ///
     /// # Errors
     /// As [`Scene::parse`].
@@ -71,7 +71,7 @@ impl Scene {
         Self::parse(text, &path.display().to_string(), base)
     }
 
-    /// As [`Scene::parse`], for mesh files that are kept elsewhere: none is looked for on disk.
+    /// As [`Scene::parse`], but mesh files are stored elsewhere and are not looked for on disk.
     ///
     /// # Errors
     /// As [`Scene::parse`].
@@ -81,11 +81,11 @@ impl Scene {
 
     /// Reads and checks the text of a scene file.
     ///
-    /// * `file` - the name that messages give it.
+    /// * `file` - its name in messages.
     /// * `base` - the folder that mesh files are relative to.
     ///
     /// # Errors
-    /// `Error::Scene` with file, line, body and the mend, at the first mistake.
+    /// `Error::Scene` with file, line, body and the fix, at the first mistake.
     pub fn parse(text: &str, file: &str, base: &Path) -> Result<Self> {
         Self::parse_by(text, file, Some(base))
     }
@@ -104,13 +104,13 @@ impl Scene {
     }
 }
 
-/// The line of a byte, from 1.
+/// The line of a byte offset, from 1.
 pub(super) fn line_of(text: &[u8], at: usize) -> usize {
     let head = &text[..at.min(text.len())];
     1 + head.iter().filter(|byte| **byte == b'\n').count()
 }
 
-/// The lines of all shapes, by one walk over the text.
+/// The lines of all shapes, found in one pass over the text.
 fn lines_of_shapes(text: &str, drafts: &[BodyDraft]) -> Vec<Vec<u32>> {
     let breaks: Vec<usize> = text
         .bytes()
@@ -176,7 +176,7 @@ fn read(text: &str, file: &str, base: Option<&Path>) -> std::result::Result<Scen
     })
 }
 
-/// The tables of `[[what]]`; none where the key is missing.
+/// The tables of `[[what]]`; empty if the key is missing.
 fn items(node: Option<Node>, what: &str) -> std::result::Result<Vec<Node>, Fault> {
     let Some(node) = node else {
         return Ok(Vec::new());
@@ -231,7 +231,7 @@ fn read_sources(node: Option<Node>) -> std::result::Result<Vec<SourceSpec>, Faul
     Ok(sources)
 }
 
-/// Milliseconds in the file, nanoseconds inside.
+/// Reads a time, milliseconds in the file, as nanoseconds.
 pub(crate) fn time_ns(
     table: &mut Table,
     key: &str,

@@ -1,6 +1,6 @@
-//! Reads one shape with its place in the body.
+//! Reads one shape with its pose in the body.
 //!
-//! In: a node of a scene file or of a request. Out: a checked `PlacedSpec`; files are named, not opened.
+//! In: a node of a scene file or of a request. Out: a checked `PlacedSpec`; files are not opened.
 
 use crate::error::nearest;
 use crate::limits::{COORDINATE_MAX_M, QUATERNION_NORM_TOLERANCE, REQUEST_BYTES_MAX};
@@ -10,7 +10,7 @@ use crate::scene::node::{Fault, Node, Value};
 use crate::scene::table::{Table, list, real, reals, shortened};
 use crate::shape::ShapeSpec;
 
-/// Every type and its keys.
+/// Every shape type and its keys.
 const TYPES: &[(&str, &[&str])] = &[
     ("sphere", &["radius"]),
     ("box", &["half_extents"]),
@@ -29,7 +29,7 @@ const PLACE_KEYS: &[&str] = &["type", "position", "orientation"];
 
 /// Reads a shape.
 ///
-/// * `blobs` - the bytes behind the JSON of a request, which `vertices_blob` and `faces_blob` point into.
+/// * `blobs` - the bytes after the JSON of a request, which `vertices_blob` and `faces_blob` point into.
 pub(crate) fn read_shape(node: Node, blobs: Option<&[u8]>) -> Result<PlacedSpec, Fault> {
     let names: Vec<&str> = TYPES.iter().map(|(name, _)| *name).collect();
     let at = node.at;
@@ -65,7 +65,7 @@ pub(crate) fn read_shape(node: Node, blobs: Option<&[u8]>) -> Result<PlacedSpec,
     let pose = read_pose(&mut table)?;
     let shape = read_spec(kind, &mut table, blobs)?;
     shape.check().map_err(|e| {
-        // The text starts with the key it is about: point at that key's line.
+        // The text starts with the key that it is about; the error is reported at the line of that key.
         let text = e.to_string();
         let key = table.places().find(|(key, _)| {
             let rest = text.strip_prefix(key);
@@ -82,7 +82,7 @@ pub(crate) fn read_pose(table: &mut Table) -> Result<Pose, Fault> {
     let at = table.at("position");
     let position = table.triple("position")?.unwrap_or_default();
     if let Some(far) = position.iter().find(|x| x.abs() > COORDINATE_MAX_M) {
-        let text = format!("position holds {far} m: stay within {COORDINATE_MAX_M:e} m");
+        let text = format!("position holds {far:e} m: stay within {COORDINATE_MAX_M:e} m");
         return Err(Fault::new(at, text));
     }
     let Some(node) = table.take("orientation") else {
@@ -252,7 +252,7 @@ fn doubled(table: &Table, key: &str) -> Fault {
     Fault::new(table.at(key), text)
 }
 
-/// The bytes that `{ offset, count }` names: `count` rows of `row_bytes`, `offset` bytes behind the JSON.
+/// The bytes that `{ offset, count }` names: `count` rows of `row_bytes`, `offset` bytes after the JSON.
 fn take_blob<'a>(
     table: &mut Table,
     key: &str,

@@ -1,4 +1,4 @@
-//! The text of a scene file. In: a path, also of a pipe or a device. Out: text of a bounded length, or what is wrong.
+//! The text of a scene file. In: a path, also of a pipe or a device. Out: text of a bounded length, or an error.
 
 use std::fs::File;
 use std::io::Read;
@@ -8,14 +8,14 @@ use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::scene::read_scene::line_of;
 
-/// Longest scene file, bytes: beyond it geometry belongs in mesh files.
+/// Longest scene file, bytes; larger geometry belongs in mesh files.
 const FILE_BYTES_MAX: u64 = 1 << 29;
 
 impl Scene {
     /// The text of a scene file.
     ///
     /// # Errors
-    /// `Error::Scene` when it cannot be read, is too large or no text.
+    /// `Error::Scene` if it cannot be read, is too large or is not text.
     pub fn read_text(path: &Path) -> Result<String> {
         let shown = path.display().to_string();
         let unreadable = |e: std::io::Error| {
@@ -28,7 +28,7 @@ impl Scene {
                 "{shown}: the scene file has {size}more than {FILE_BYTES_MAX} bytes: keep meshes in files of their own"
             ))
         };
-        // The size first: what waits in a pipe, or comes from a device, has none.
+        // The size is only a first check: a pipe or a device has none.
         let size = std::fs::metadata(path).map_err(unreadable)?.len();
         if size > FILE_BYTES_MAX {
             return Err(too_long(&format!("{size} bytes, ")));
@@ -45,7 +45,7 @@ impl Scene {
     }
 }
 
-/// All that there is; `None`: it is more than `most` bytes.
+/// Reads to the end; `None`: there are more than `most` bytes.
 fn up_to(from: &mut impl Read, most: u64) -> std::io::Result<Option<Vec<u8>>> {
     let mut bytes = Vec::new();
     from.take(most + 1).read_to_end(&mut bytes)?;
@@ -56,7 +56,7 @@ fn up_to(from: &mut impl Read, most: u64) -> std::io::Result<Option<Vec<u8>>> {
 mod tests {
     use super::*;
 
-    /// `/dev/zero` has no size and no end: it was read until the memory was full.
+    /// `/dev/zero` has no size and no end; reading it once filled the memory.
     #[test]
     fn bug_what_has_no_end_is_read_to_the_limit() {
         assert_eq!(up_to(&mut std::io::repeat(0), 1000).unwrap(), None);

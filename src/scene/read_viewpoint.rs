@@ -9,11 +9,11 @@ use crate::scene::node::{Fault, Node};
 use crate::scene::read_body::BODY_NAME_BYTES_MAX;
 use crate::scene::table::{Table, mend_name, shortened};
 
-/// What is in view counts this many times as much, where the scene does not say.
+/// Default factor on the weight of what is in view.
 const WEIGHT_DEFAULT: f64 = 4.0;
-/// Half of what is seen across, where the scene does not say: 60 degrees in all.
+/// Default half-angle of the view, radians: 60 degrees in total.
 const HALF_ANGLE_RAD_DEFAULT: f64 = PI / 6.0;
-/// Narrower, and nothing but what stands around the eye is ever seen.
+/// Least half-angle, radians: a narrower view contains only what surrounds the eye.
 const HALF_ANGLE_RAD_MIN: f64 = 1e-3;
 
 /// Reads `[viewpoint]`.
@@ -53,7 +53,7 @@ pub(crate) fn read_viewpoint(node: Node, bodies: &[&str]) -> Result<Viewpoint, F
         let text = "direction of the viewpoint has no length: write where it looks, as [1, 0, 0]";
         return Err(Fault::new(at, text));
     }
-    // By its largest part first: the square of 1e200 or 1e-200 is none.
+    // Scaled by its largest component first: the square of 1e200 overflows and that of 1e-200 underflows.
     let direction = (direction / largest).normalize();
     let half_angle_rad = table.number_within("half_angle_rad", HALF_ANGLE_RAD_MIN, PI)?;
     let weight = table.number_within("weight", 1.0, VIEW_WEIGHT_MAX)?;

@@ -1,7 +1,7 @@
-//! Requests to edit a running scene: JSON in the words of scene files, with bulk geometry behind it.
+//! Requests to edit a running scene: JSON with the keys of scene files, followed by binary geometry.
 //!
-//! In: the JSON of a request and the bytes behind it. Out: checked edits, in order; what they say of bodies and sources
-//! that the scene has or has not is checked where they are applied, all of them or none.
+//! In: the JSON of a request and the bytes after it. Out: checked edits, in order. References to bodies and sources of
+//! the scene are checked when the edits are applied; either all edits are applied or none.
 //!
 //! ```json
 //! { "edits": [
@@ -20,12 +20,13 @@
 //! ] }
 //! ```
 //!
-//! `{ "validate": true }`, alone or beside `edits`, has the daemon check every structure before the next tick and build
-//! anew what does not hold; the answer's warnings say what that was.
+//! `{ "validate": true }`, alone or together with `edits`, makes the daemon check every structure before the next tick
+//! and rebuild those that are inconsistent; the answer's warnings list them.
 //!
-//! A question, alone, changes nothing: see `question`.
+//! A request may instead be one question, which changes nothing: see `question`.
 //!
-//! A blob is `count` rows, `offset` bytes behind the JSON, little-endian: three f64 a vertex, three u32 a face.
+//! A blob is `count` rows, starting `offset` bytes after the JSON, little-endian: three f64 per vertex, three u32 per
+//! face.
 
 use std::path::Path;
 
@@ -44,10 +45,10 @@ use crate::scene::resolve::{check_files, settle_source};
 use crate::scene::table::{Table, list, shortened};
 use crate::scene::{BodySpec, PairRule, SourceSpec};
 
-/// Edits in one request; more are to be sent in several.
+/// Most edits in one request; more must be sent in several requests.
 pub const EDITS_MAX: usize = 1 << 17;
 
-/// What a client asks of a running daemon.
+/// A client's request to a running daemon.
 #[derive(Debug)]
 pub enum Request {
     /// To change the scene.
@@ -56,28 +57,28 @@ pub enum Request {
     Ask(Question),
 }
 
-/// Several edits that are done together or not at all.
+/// Edits that are applied all together or not at all.
 #[derive(Debug)]
 pub struct EditRequest {
     /// In order.
     pub edits: Vec<Edit>,
-    /// Check every structure first, and build anew what does not hold.
+    /// Check every structure first, and rebuild those that are inconsistent.
     pub validate: bool,
 }
 
-/// One change of the scene, checked by itself.
+/// One change of the scene, checked except for its references to the scene.
 ///
-/// * `P` - what is put: a body as it was read, or one that is built, which the engine takes.
+/// * `P` - the body to put: as read, or built, as the engine takes it.
 #[derive(Clone, Debug)]
 pub enum Edit<P = Box<BodyDraft>> {
-    /// A body by name: new, or in place of the one of this name. The same content again changes nothing.
+    /// Adds a body, or replaces the one of the same name. Equal content changes nothing.
     Put(P),
-    /// Takes a body out.
+    /// Removes a body.
     Remove {
         /// Its name.
         name: String,
     },
-    /// Lets a body take part, or not.
+    /// Enables or disables a body.
     Enable {
         /// Its name.
         name: String,
@@ -88,39 +89,39 @@ pub enum Edit<P = Box<BodyDraft>> {
     Filter {
         /// Its name.
         name: String,
-        /// Groups it belongs to; `None`: as they are.
+        /// Groups it belongs to; `None`: unchanged.
         group: Option<u32>,
-        /// Groups it collides with; `None`: as they are.
+        /// Groups it collides with; `None`: unchanged.
         mask: Option<u32>,
     },
-    /// Sets how near a pair must come to be told as near.
+    /// Sets the distance below which a pair is reported as near.
     Margin {
-        /// The body's name; `None`: every body that is there.
+        /// The body's name; `None`: every present body.
         name: Option<String>,
-        /// Distance, metres; `None`: what the body was put with.
+        /// Distance, metres; `None`: the value the body was put with.
         report_within_m: Option<f64>,
     },
-    /// Adds a pair rule behind all others, so that it wins over them.
+    /// Adds a pair rule after all others, so that it takes precedence.
     Rule(PairRule),
-    /// Takes out every pair rule of these two sides, in either order.
+    /// Removes every pair rule with these two sides, in either order.
     DropRules {
-        /// The one side, as the rule says it.
+        /// One side, as written in the rule.
         a: String,
         /// The other side.
         b: String,
     },
-    /// Hangs a body on another, or lets it go.
+    /// Attaches a body to another, or detaches it.
     Attach {
         /// Its name.
         name: String,
-        /// The body to hang it on; `None`: it is on its own again.
+        /// Name of the body to attach it to; `None`: detach it.
         to: Option<String>,
-        /// Its pose seen from there; `None`: where it is now.
+        /// Its pose in that body's frame; `None`: its current pose.
         pose: Option<Pose>,
     },
-    /// Forgets every pose: pairs end, bodies that move are not received again.
+    /// Forgets poses: pairs end, and the poses of moving bodies are unknown until they are received again.
     Reset {
-        /// Of this source's bodies only; `None`: of all.
+        /// Only for the bodies of this source; `None`: for all bodies.
         source: Option<String>,
     },
 }
@@ -128,21 +129,21 @@ pub enum Edit<P = Box<BodyDraft>> {
 impl Request {
     /// Reads a request.
     ///
-    /// * `json` - the JSON at the front of the payload.
-    /// * `blobs` - the bytes behind it.
+    /// * `json` - the JSON at the start of the payload.
+    /// * `blobs` - the bytes after it.
     ///
     /// # Errors
-    /// One text that names the edit, the body, what is wrong and what to change.
+    /// A text that names the edit, the body, what is wrong and what to change.
     pub fn parse(json: &[u8], blobs: &[u8]) -> Result<Self, String> {
         read(json, blobs).map_err(|fault| fault.text)
     }
 }
 
 impl<P> Edit<P> {
-    /// The same edit, with what it puts made into something else.
+    /// Converts the body that the edit puts, if any.
     ///
     /// # Errors
-    /// What `build` says.
+    /// The error of `build`.
     pub fn build<Q, E>(self, build: impl FnOnce(P) -> Result<Q, E>) -> Result<Edit<Q>, E> {
         Ok(match self {
             Self::Put(put) => Edit::Put(build(put)?),
@@ -165,13 +166,13 @@ impl<P> Edit<P> {
 }
 
 impl BodyDraft {
-    /// The body, its source found and its mesh files seen; an id that was not given stays 0.
+    /// The body, with its source resolved and its mesh files found; an id that was not given stays 0.
     ///
     /// * `sources` - of the running scene.
     /// * `base` - the folder that mesh files are relative to; `None`: they are not looked for.
     ///
     /// # Errors
-    /// One text that names the body, what is wrong and what to change.
+    /// A text that names the body, what is wrong and what to change.
     pub fn settle(
         mut self,
         sources: &[SourceSpec],
@@ -297,7 +298,7 @@ fn read_edit(node: Node, blobs: &[u8]) -> Result<Edit, Fault> {
     .map_err(fault_within)
 }
 
-/// A body's name as the whole value.
+/// A value that is a body's name.
 fn plain_name(node: Node) -> Result<String, Fault> {
     let text = match node.value {
         Value::Text(name) if (1..=BODY_NAME_BYTES_MAX).contains(&name.len()) => return Ok(name),

@@ -1,4 +1,4 @@
-//! From drafts to bodies: doubled names and ids, sources, neighbours, attachments, files.
+//! From drafts to bodies: duplicate names and ids, sources, neighbours, attachments, files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -12,9 +12,9 @@ use crate::scene::table::{mend_name, shortened};
 use crate::scene::{BodySpec, SourceSpec};
 use crate::shape::ShapeSpec;
 
-/// Settles what bodies say of each other and of the sources.
+/// Resolves the references of bodies to each other and to the sources.
 ///
-/// * `base` - the folder that mesh files are relative to; `None`: they are not looked for.
+/// * `base` - the folder that mesh files are relative to; `None`: mesh files are not looked for.
 ///
 /// Cost: O(n log n).
 pub(crate) fn resolve(
@@ -86,7 +86,7 @@ fn check_reference(
         }
         if !by_name.contains_key(name) {
             let names = drafts.iter().map(|d| d.spec.name.as_str());
-            // A body is not its own.
+            // A body cannot refer to itself.
             let known: Vec<&str> = names.filter(|own| *own != draft.spec.name).collect();
             let text = format!(
                 "{key} names body \"{}\", which is not there: {}",
@@ -99,7 +99,7 @@ fn check_reference(
     Ok(())
 }
 
-/// Neighbours form trees, and so do attachments.
+/// Checks that neighbours and attachments form no cycles.
 fn check_loops(drafts: &[BodyDraft], by_name: &BTreeMap<String, usize>) -> Result<(), Fault> {
     type Link = fn(&BodyDraft) -> Option<&String>;
     let links: [(&str, Link); 2] = [
@@ -107,7 +107,7 @@ fn check_loops(drafts: &[BodyDraft], by_name: &BTreeMap<String, usize>) -> Resul
         ("attached_to", |d| d.spec.attached_to.as_ref()),
     ];
     for (key, link) in links {
-        // The walk that first came by; 0: none yet.
+        // By body: the walk that first visited it; 0: none yet.
         let mut walk_of = vec![0_usize; drafts.len()];
         for start in 0..drafts.len() {
             let (walk, mut at) = (start + 1, start);
@@ -133,7 +133,7 @@ fn check_loops(drafts: &[BodyDraft], by_name: &BTreeMap<String, usize>) -> Resul
     Ok(())
 }
 
-/// Given ids first; then the least free one for each of the others, in order.
+/// Assigns ids: the given ones first, then the least free one to each other body, in order.
 fn settle_ids(drafts: &mut [BodyDraft]) -> Result<(), Fault> {
     let mut taken: BTreeMap<u64, usize> = BTreeMap::new();
     for (place, draft) in drafts.iter().enumerate() {
@@ -189,7 +189,7 @@ pub(crate) fn settle_source(draft: &mut BodyDraft, sources: &[SourceSpec]) -> Re
     Ok(())
 }
 
-/// Mesh files must be there; they are read when shapes are built.
+/// Checks that mesh files exist; they are read when shapes are built.
 pub(crate) fn check_files(
     draft: &BodyDraft,
     base: &Path,

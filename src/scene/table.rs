@@ -4,11 +4,11 @@ use crate::error::nearest;
 use crate::scene::node::{Entry, Fault, Node, Value};
 use crate::scene::read_body::BODY_NAME_BYTES_MAX;
 
-/// Letters of a text that a message shows at most: as many as the longest name may have. Less would cut off what tells
-/// two names of a generated scene apart.
+/// Most characters of a text shown in a message: the length of the longest name. With fewer, long names of a generated
+/// scene could look the same.
 const SHOWN_MAX: usize = BODY_NAME_BYTES_MAX;
 
-/// A table being read. Values are taken out by key.
+/// A table that is being read. Values are taken from it by key.
 #[derive(Debug)]
 pub(crate) struct Table {
     at: Option<usize>,
@@ -17,7 +17,7 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// Opens a table; refuses every key that is not known.
+    /// Opens a table; an unknown key is an error.
     ///
     /// * `what` - what the table describes, with its article: `a body`.
     pub(crate) fn open(node: Node, what: &'static str, known: &[&str]) -> Result<Self, Fault> {
@@ -39,29 +39,29 @@ impl Table {
         Ok(Self { at, what, entries })
     }
 
-    /// The place of a key, or of the table where the key is missing.
+    /// Byte offset of a key, or of the table if the key is missing.
     pub(crate) fn at(&self, key: &str) -> Option<usize> {
         let entry = self.entries.iter().find(|(known, _, _)| known == key);
         entry.map_or(self.at, |(_, at, _)| *at)
     }
 
-    /// Whether the key is there.
+    /// Whether the key is present.
     pub(crate) fn has(&self, key: &str) -> bool {
         self.entries.iter().any(|(known, _, _)| known == key)
     }
 
-    /// The keys and their places.
+    /// The keys and their byte offsets.
     pub(crate) fn places(&self) -> impl Iterator<Item = (&str, Option<usize>)> {
         self.entries.iter().map(|(key, at, _)| (key.as_str(), *at))
     }
 
-    /// Takes a value out.
+    /// Takes a value, if it is present.
     pub(crate) fn take(&mut self, key: &str) -> Option<Node> {
         let entry = self.entries.iter_mut().find(|(known, _, _)| known == key)?;
         entry.2.take()
     }
 
-    /// Takes a value that must be there.
+    /// Takes a value; an error if it is missing.
     pub(crate) fn need(&mut self, key: &str) -> Result<Node, Fault> {
         let (at, what) = (self.at, self.what);
         self.take(key)
@@ -239,7 +239,7 @@ pub(crate) fn list(node: Node, what: &str) -> Result<Vec<Node>, Fault> {
     }
 }
 
-/// A text as messages show it: what has no glyph is escaped, and what is longer than any name is cut off.
+/// A text as shown in messages: characters without a glyph are escaped, and text longer than any name is cut off.
 pub(crate) fn shortened(text: &str) -> String {
     let mut shown = String::new();
     for (nth, letter) in text.chars().enumerate() {
@@ -265,7 +265,7 @@ fn unknown_key(entry: &Entry, what: &str, known: &[&str]) -> Fault {
     Fault::new(entry.at, format!("{what} has no key `{key}`: {mend}"))
 }
 
-/// What to do about a name that refers to nothing.
+/// The advice for a name that refers to nothing.
 pub(crate) fn mend_name(name: &str, known: &[&str], header: &str) -> String {
     match nearest(name, known) {
         Some(nearest) => format!("did you mean \"{}\"?", shortened(nearest)),

@@ -171,7 +171,7 @@ pub(crate) fn points(vertices: &[[f64; 3]]) -> Result<(), ShapeError> {
             }
             if value.abs() > EXTENT_MAX_M {
                 return Err(ShapeError::Setting(format!(
-                    "vertices[{place}] is {value} m from the shape's origin: stay within {EXTENT_MAX_M:e} m"
+                    "vertices[{place}] is {value:e} m from the shape's origin: stay within {EXTENT_MAX_M:e} m"
                 )));
             }
         }
@@ -211,7 +211,7 @@ fn half_space(normal: [f64; 3], offset: f64) -> Result<(), ShapeError> {
     }
     if offset.abs() > COORDINATE_MAX_M {
         return Err(ShapeError::Setting(format!(
-            "offset is {offset} m: stay within {COORDINATE_MAX_M:e} m"
+            "offset is {offset:e} m: stay within {COORDINATE_MAX_M:e} m"
         )));
     }
     Ok(())
@@ -241,7 +241,7 @@ fn grid(heights: &[Vec<f64>]) -> Result<(), ShapeError> {
             }
             if height.abs() > EXTENT_MAX_M {
                 return Err(ShapeError::Setting(format!(
-                    "heights[{row}] holds {height} m: stay within {EXTENT_MAX_M:e} m"
+                    "heights[{row}] holds {height:e} m: stay within {EXTENT_MAX_M:e} m"
                 )));
             }
         }

@@ -1,4 +1,4 @@
-//! The meter: spends a tick's budget, unit by unit, and looks at the clock now and then.
+//! The meter: spends a tick's budget unit by unit and reads the clock at intervals.
 
 use super::Clock;
 
@@ -128,7 +128,7 @@ impl<'a> Meter<'a> {
         }
     }
 
-    /// Charges `units` of dear work (an exact query, some microseconds) and reads the clock at once; returns what it
+    /// Charges `units` of costly work (an exact query, some microseconds) and reads the clock at once; returns what it
     /// took since the clock was read before, nanoseconds, 0 without a deadline or a beat.
     pub fn charge_dear(&mut self, units: u64) -> u64 {
         self.count(units);
@@ -248,7 +248,7 @@ impl<'a> Meter<'a> {
         if let Some(beat) = self.beat.as_mut().filter(|beat| now_ns >= beat.next_ns) {
             beat.next_ns = now_ns.saturating_add(beat.period_ns);
             (beat.call)();
-            // What it took was no work.
+            // The time of the call is not work.
             self.read_ns = self.clock.monotonic_ns().max(now_ns);
         }
         let ns = now_ns - from_ns;
