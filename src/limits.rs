@@ -7,6 +7,9 @@ pub const THREADS_MAX: usize = 8;
 /// Comparisons of boxes in a tick's search from which on other threads are asked: about half a millisecond. To wake
 /// another thread and to wait for it takes up to 50 us.
 pub const SHARED_TESTS_MIN: u64 = 36_000;
+/// Names that pair rules with patterns match in all, each counted once per side of each rule: every one is kept, and
+/// counting ignored pairs goes through them. An edit that would make more is refused, and so is a scene.
+pub const PATTERN_MATCHES_MAX: usize = 1 << 22;
 /// Sources a daemon can have, and so the source rows of a tick. iceoryx2 reserves a connection for each.
 pub const SOURCES_MAX: usize = 16;
 /// Bodies a scene may hold. Slots are u32 and a pair key is two of them; beyond a million the floor of a tick

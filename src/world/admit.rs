@@ -304,8 +304,10 @@ impl World {
     pub(super) fn forget_poses(&mut self, source: SourceSlot) {
         for index in 0..self.bodies.len() {
             let slot = BodySlot::at(index);
-            let own = self.entries[index].root == slot;
-            if own && self.body(slot).is_some_and(|body| owns(source, body)) {
+            // Its root is not up to date while a request is applied.
+            if self.hold_of(slot).is_none()
+                && self.body(slot).is_some_and(|body| owns(source, body))
+            {
                 self.forget_pose(slot);
             }
         }

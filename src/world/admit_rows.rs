@@ -171,7 +171,7 @@ impl World {
             // The common case of a world at rest: nothing but the age is new.
             let stamp_ns = body.stamp_ns;
             self.ages.set(slot, Some(deadline_ns), Some(stamp_ns));
-            self.entries[slot.index()].touched = self.tick;
+            self.touch(slot);
         } else {
             self.settle(slot, moved);
         }

@@ -244,39 +244,6 @@ impl World {
         self.growing = growing;
     }
 
-    /// Attached bodies take pose, age and unknown from the body they hang on.
-    pub(super) fn settle_attached(&mut self) {
-        for place in 0..self.attached.len() {
-            let slot = self.attached[place];
-            let entry = &self.entries[slot.index()];
-            let (root, root_pose) = (entry.root, entry.root_pose);
-            if self.entries[root.index()].touched != self.tick && entry.touched != self.tick {
-                continue;
-            }
-            let Some(root) = self.body(root) else {
-                continue;
-            };
-            let pose = root.pose * root_pose;
-            let velocity = root.twist_at(&root_pose.translation.vector.into());
-            let (stamp_ns, since_ns, received_ns) =
-                (root.stamp_ns, root.since_ns, root.received_ns);
-            let reject = root.reject;
-            let moved = self.place_attached(slot, &pose);
-            if let Some(body) = self.bodies[slot.index()].as_mut() {
-                body.stamp_ns = stamp_ns;
-                body.since_ns = since_ns;
-                body.received_ns = received_ns;
-                body.reject = reject;
-            }
-            let was_in = self.body(slot).is_some_and(|body| body.in_broad);
-            let other_speed = self.take_velocity(slot, velocity);
-            self.settle(slot, moved);
-            if other_speed && !moved && was_in {
-                self.lists.restated(slot);
-            }
-        }
-    }
-
     /// Gives a body another velocity; whether it is another one.
     pub(super) fn take_velocity(&mut self, slot: BodySlot, velocity: Option<Twist>) -> bool {
         let Some(body) = self.bodies[slot.index()].as_mut() else {

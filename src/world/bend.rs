@@ -15,7 +15,7 @@ use crate::ids::{BodyId, BodySlot, SourceSlot};
 use crate::limits::DEFORMING_VERTICES_MAX;
 use crate::math::Aabb;
 use crate::shape::{NoVertex, Shape, can_be_vertices};
-use crate::wire::{RejectReason, VertexFrame, WIRE_VERSION, name_str, vertex_flags};
+use crate::wire::{RejectReason, VertexFrame, VertexHeader, WIRE_VERSION, name_str, vertex_flags};
 
 /// State of the vertices of a body that deforms.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -162,19 +162,19 @@ impl World {
     ) -> Result<(SourceSlot, BodySlot), (Option<SourceSlot>, RejectReason)> {
         let header = &frame.header;
         let name = name_str(&header.source);
-        let (Some(name), true) = (name, header.schema == WIRE_VERSION && header.session != 0)
-        else {
-            return Err((None, RejectReason::BadLayout));
-        };
-        let Some(source) = self.source_named(name) else {
+        let source = name.and_then(|name| self.source_named(name));
+        if header.schema != WIRE_VERSION || header.session == 0 || name.is_none() {
+            return Err(self.refuse_unread(source, header, RejectReason::BadLayout));
+        }
+        let Some(source) = source else {
             return Err((None, RejectReason::UnknownSource));
         };
         let refused = |reason| Err((Some(source), reason));
         if self.is_of_other_boot(header.boot) {
-            return refused(RejectReason::SessionOver);
+            return Err(self.refuse_unread(Some(source), header, RejectReason::SessionOver));
         }
         if self.sources[source.index()].note_bent(header) {
-            self.lose_vertices(source);
+            self.lose_vertices(source, RejectReason::VertexVersion);
         }
         // A sender that may not bend the body cannot end another's session.
         let found = self.find_bendable(source, header.body);
@@ -286,14 +286,31 @@ impl World {
         }
     }
 
+    /// Vertices whose body cannot be read. If the session in force sent them they are lost, and newer than what is
+    /// there; no other sender can make a body unknown in this way.
+    fn refuse_unread(
+        &mut self,
+        source: Option<SourceSlot>,
+        header: &VertexHeader,
+        reason: RejectReason,
+    ) -> (Option<SourceSlot>, RejectReason) {
+        if let Some(source) = source
+            && header.session != 0
+            && header.session == self.sources[source.index()].session
+        {
+            self.lose_vertices(source, reason);
+        }
+        (source, reason)
+    }
+
     /// Vertices of a source were lost, for an unknown body: all bodies that it has bent may have another shape by now.
-    fn lose_vertices(&mut self, source: SourceSlot) {
+    fn lose_vertices(&mut self, source: SourceSlot, reason: RejectReason) {
         for at in 0..self.deforming.len() {
             let slot = self.deforming[at];
             let body = self.body(slot).filter(|body| owns(source, body));
             let vertices = body.and_then(|body| body.vertices.as_deref());
             if vertices.is_some_and(|vertices| vertices.version.is_some()) {
-                self.refuse_vertices(slot, RejectReason::VertexVersion);
+                self.refuse_vertices(slot, reason);
             }
         }
     }

@@ -18,6 +18,9 @@ use crate::ids::{BodySlot, PairKey, small};
 
 /// Most pairs one rule may force to be candidates; a rule with more widens the boxes of its bodies instead.
 pub(super) const FORCED_PER_RULE_MAX: usize = 1 << 12;
+/// If one side of such a rule has this many times as many bodies as the other, only those of the shorter side are
+/// widened, by the whole distance: a box in a crowd that is widened by twice as much meets up to eight times as many.
+const LOPSIDED: usize = 8;
 
 /// What makes bodies alike for pattern rules: which speak of them and on which side, and whether they can be paired.
 type Kind<'a> = (&'a [(u32, u8)], u16);
@@ -260,10 +263,7 @@ impl Filters {
             let (side_a, side_b) = (there(&rule.a), there(&rule.b));
             if side_a.len().saturating_mul(side_b.len()) > FORCED_PER_RULE_MAX {
                 self.any_margin = true;
-                for slot in side_a.iter().chain(&side_b) {
-                    let margin_m = &mut self.margins_m[slot.index()];
-                    *margin_m = margin_m.max(report_within_m / 2.0);
-                }
+                widen_sides(&mut self.margins_m, (&side_a, &side_b), report_within_m);
                 continue;
             }
             for &a in &side_a {
@@ -288,6 +288,24 @@ impl Filters {
                 .last_match(hot_a.name, hot_b.name)
                 .is_some_and(|(last, _)| last == rule)
             && self.decide(a, b).allows()
+    }
+}
+
+/// Raises the margins of a rule's bodies so that boxes of its two sides meet within a distance.
+fn widen_sides(margins_m: &mut [f64], (side_a, side_b): (&[BodySlot], &[BodySlot]), within_m: f64) {
+    let (shorter, longer) = if side_a.len() <= side_b.len() {
+        (side_a, side_b)
+    } else {
+        (side_b, side_a)
+    };
+    let (longer, margin_m) = if shorter.len() * LOPSIDED <= longer.len() {
+        (&[][..], within_m)
+    } else {
+        (longer, within_m / 2.0)
+    };
+    for slot in shorter.iter().chain(longer) {
+        let widest_m = &mut margins_m[slot.index()];
+        *widest_m = widest_m.max(margin_m);
     }
 }
 

@@ -106,7 +106,7 @@ impl World {
         for &slot in &after.enabled {
             self.settle(slot, false);
         }
-        if self.edit_rules(edits) {
+        if self.edit_rules(edits, step) {
             after.changed = true;
             after.uncounted = Uncounted::Rules;
         }

@@ -63,7 +63,7 @@ impl World {
     /// Whether a request can be applied as a whole.
     ///
     /// * `numbered` - whether errors say which edit it is.
-    /// * `step` - called after each edit.
+    /// * `step` - called after each edit, and for each rule with a pattern.
     pub(super) fn check(
         &self,
         edits: &[Edit],
@@ -95,7 +95,8 @@ impl World {
             })?;
             step();
         }
-        draft.references_hold(edits)
+        draft.references_hold(edits)?;
+        draft.patterns_hold(step)
     }
 }
 

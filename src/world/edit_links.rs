@@ -153,27 +153,29 @@ impl World {
     ///
     /// Cost: O(n log n) of these and the attached bodies.
     pub(super) fn link<'a>(&mut self, edited: impl Iterator<Item = &'a BodySlot>) {
-        let mut slots = std::mem::take(&mut self.attached);
+        let mut slots = self.attached.slots().to_vec();
         slots.extend(edited);
         slots.sort_unstable();
         slots.dedup();
-        let mut known = BTreeMap::new();
+        let (mut known, mut attached) = (BTreeMap::new(), Vec::new());
         for slot in slots {
             if self.body(slot).is_none() {
                 continue;
             }
             let root = self.root_among(slot, &mut known);
             if root.0 != slot {
-                self.attached.push(slot);
+                attached.push(slot);
             }
             self.take_root(slot, root);
         }
         self.link_paths();
         // Their roots are settled now.
-        for place in 0..self.attached.len() {
-            let slot = self.attached[place];
+        for slot in &attached {
             self.entries[slot.index()].touched = self.tick;
         }
+        let entries = &self.entries;
+        self.attached
+            .set(attached, |slot| entries[slot.index()].root);
         self.settle_attached();
     }
 
@@ -200,7 +202,7 @@ impl World {
     }
 
     /// What a body hangs on, if that is there, and its pose there.
-    fn hold_of(&self, slot: BodySlot) -> Option<(BodySlot, Pose)> {
+    pub(super) fn hold_of(&self, slot: BodySlot) -> Option<(BodySlot, Pose)> {
         let (to, local) = self.entries[slot.index()].attach?;
         Some((self.names.get(to).slot?, local))
     }

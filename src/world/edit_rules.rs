@@ -26,7 +26,9 @@ impl World {
     /// The rules as the edits of a request make them, compiled once behind the last; whether they changed.
     ///
     /// What other edits make of the bodies has no say in it: what counts is the scene after the request.
-    pub(super) fn edit_rules(&mut self, edits: &[Edit]) -> bool {
+    ///
+    /// * `step` - called after each rule that was compiled.
+    pub(super) fn edit_rules(&mut self, edits: &[Edit], step: &mut dyn FnMut()) -> bool {
         let is_rule = |edit: &Edit| matches!(edit, Edit::Rule(_) | Edit::DropRules { .. });
         if !edits.iter().any(is_rule) {
             return false;
@@ -45,7 +47,8 @@ impl World {
             self.filters.rules.put_back(old);
             return false;
         }
-        self.filters.rules.set(draft.to_list(), &mut self.names);
+        let list = draft.to_list();
+        self.filters.rules.set(list, &mut self.names, step);
         self.requery_named(&changed);
         true
     }

@@ -107,21 +107,21 @@ impl World {
 
     /// The bodies attached to a body, directly or through others, each with its pose relative to it; by slot.
     ///
-    /// Cost: O(attached bodies).
+    /// Cost: O(bodies with the same root), times the length of their chains unless this body is the root.
     #[must_use]
     pub fn hanging_on(&self, slot: BodySlot) -> Vec<(BodySlot, Pose)> {
         let Some(entry) = self.entries.get(slot.index()) else {
             return Vec::new();
         };
-        let kin = |other: &BodySlot| self.entries[other.index()].root == entry.root;
-        let attached = self.attached.iter().copied().filter(kin);
-        let mut found: Vec<_> = attached
-            .filter_map(|other| {
-                let (_, pose) = self.above(other).find(|(at, _)| *at == slot)?;
-                Some((other, pose))
-            })
-            .collect();
-        found.sort_unstable_by_key(|(other, _)| *other);
-        found
+        let kin = self.attached.of_root(entry.root).iter().map(|of| of.1);
+        if entry.root == slot {
+            let pose = |other: BodySlot| self.entries[other.index()].root_pose;
+            return kin.map(|other| (other, pose(other))).collect();
+        }
+        kin.filter_map(|other| {
+            let (_, pose) = self.above(other).find(|(at, _)| *at == slot)?;
+            Some((other, pose))
+        })
+        .collect()
     }
 }

@@ -10,6 +10,7 @@ mod admit;
 mod admit_rows;
 mod age;
 mod ahead;
+mod attached;
 mod bend;
 mod bends_waiting;
 mod body;
@@ -67,6 +68,7 @@ use crate::math::Aabb;
 use crate::scene::Scene;
 use crate::wire::BodyStatus;
 use age::Ages;
+use attached::Attached;
 use bends_waiting::BendsWaiting;
 use edit_rules::Uncounted;
 use lists::Lists;
@@ -97,7 +99,7 @@ pub struct World {
     /// Slots freed in this tick.
     resting: Vec<BodySlot>,
     /// Bodies that take their pose from another.
-    attached: Vec<BodySlot>,
+    attached: Attached,
     /// Stale bodies whose reach is still growing.
     growing: Vec<BodySlot>,
     /// Bodies whose place is lost and whose boxes make pairs in this tick.
@@ -178,7 +180,7 @@ impl World {
         world
             .filters
             .rules
-            .set(scene.rules.clone(), &mut world.names);
+            .set(scene.rules.clone(), &mut world.names, &mut || {});
         world
             .check(&edits, false, &mut || {})
             .map_err(Error::Scene)?;
@@ -208,7 +210,7 @@ impl World {
             boot: 0,
             free: Vec::new(),
             resting: Vec::new(),
-            attached: Vec::new(),
+            attached: Attached::default(),
             growing: Vec::new(),
             met: Vec::new(),
             pathed: Vec::new(),
@@ -249,6 +251,7 @@ impl World {
         self.free.append(&mut self.resting);
         self.take_timeouts();
         self.end_travels();
+        self.attached.begin();
         self.admits = true;
     }
 

@@ -191,8 +191,8 @@ impl World {
         let judged = self.judge(slot, body);
         let (was_status, was_reach_m, was_in) = (body.status, body.reach_m, body.in_broad);
         let widened_m = self.widening(slot, body, judged.reach_m);
+        self.touch(slot);
         let entry = &mut self.entries[slot.index()];
-        entry.touched = self.tick;
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return;
         };

@@ -70,8 +70,13 @@ impl<'a> RuleDraft<'a> {
     }
 
     /// The rules, in order.
+    pub(super) fn iter(&self) -> impl Iterator<Item = &'a PairRule> {
+        self.list.iter().copied().flatten()
+    }
+
+    /// The rules, in order, each a copy.
     pub(super) fn to_list(&self) -> Vec<PairRule> {
-        self.list.iter().copied().flatten().cloned().collect()
+        self.iter().cloned().collect()
     }
 }
 

@@ -31,6 +31,8 @@ pub(super) struct Rules {
     of_name: Vec<OfName>,
     /// The rules with a pattern.
     patterned: Vec<u32>,
+    /// Names that these match, counted once per side.
+    matches: usize,
     any_report: bool,
 }
 
@@ -49,17 +51,36 @@ impl Rules {
         self.list = list;
     }
 
+    /// The rules with a pattern, in order.
+    pub(super) fn patterned(&self) -> impl Iterator<Item = &PairRule> {
+        let places = self.patterned.iter();
+        places.filter_map(|place| self.list.get(*place as usize))
+    }
+
+    /// Names that the rules with a pattern match, counted once per side of each.
+    pub(super) fn matches(&self) -> usize {
+        self.matches
+    }
+
+    /// Number of names that the rules are compiled for.
+    pub(super) fn names_len(&self) -> usize {
+        self.of_name.len()
+    }
+
     /// Replaces all rules and compiles them.
     ///
+    /// * `step` - called after each rule.
+    ///
     /// Cost: O(rules log names + names that their patterns match or that begin as they do).
-    pub(super) fn set(&mut self, list: Vec<PairRule>, names: &mut Names) {
+    pub(super) fn set(&mut self, list: Vec<PairRule>, names: &mut Names, step: &mut dyn FnMut()) {
         self.list = list;
         self.of_name.clear();
         self.patterned.clear();
+        self.matches = 0;
         self.any_report = self.list.iter().any(|r| r.report_within_m.is_some());
         // Plain names first, so that every name of a rule has its number before patterns are matched.
         for (place, rule) in self.list.iter().enumerate() {
-            if is_pattern(&rule.a) || is_pattern(&rule.b) {
+            if has_pattern(rule) {
                 self.patterned.push(small(place));
                 continue;
             }
@@ -72,7 +93,7 @@ impl Rules {
             keep_last(&mut of_name.exact);
         }
         self.of_name.resize_with(names.len(), OfName::default);
-        self.match_patterns(0, names);
+        self.match_patterns(0, names, step);
     }
 
     /// Compiles the rules for names that have turned up since.
@@ -80,7 +101,7 @@ impl Rules {
         let old = self.of_name.len();
         self.of_name.resize_with(names.len(), OfName::default);
         if names.len() - old > FEW_NAMES {
-            return self.match_patterns(old, names);
+            return self.match_patterns(old, names, &mut || {});
         }
         for name in old..names.len() {
             self.match_name(name, names);
@@ -88,11 +109,12 @@ impl Rules {
     }
 
     /// Matches all patterns with the names from `first` on.
-    fn match_patterns(&mut self, first: usize, names: &Names) {
+    fn match_patterns(&mut self, first: usize, names: &Names, step: &mut dyn FnMut()) {
         for &place in &self.patterned {
             let rule = &self.list[place as usize];
             for (pattern, side) in [(&rule.a, SIDE_A), (&rule.b, SIDE_B)] {
                 for name in names.matching(pattern).filter(|name| name.index() >= first) {
+                    self.matches += 1;
                     let sided = &mut self.of_name[name.index()].sided;
                     match sided.last_mut() {
                         Some((last, sides)) if *last == place => *sides |= side,
@@ -100,6 +122,7 @@ impl Rules {
                     }
                 }
             }
+            step();
         }
     }
 
@@ -109,6 +132,7 @@ impl Rules {
         let of_name = &mut self.of_name[name];
         for &place in &self.patterned {
             let sides = sides_of(&self.list[place as usize], text);
+            self.matches += sides.count_ones() as usize;
             if sides != 0 {
                 of_name.sided.push((place, sides));
             }
@@ -162,6 +186,11 @@ impl Rules {
             .iter()
             .map(|&(other, _)| NameId(other))
     }
+}
+
+/// Whether a side of the rule is a pattern.
+pub(super) fn has_pattern(rule: &PairRule) -> bool {
+    is_pattern(&rule.a) || is_pattern(&rule.b)
 }
 
 /// The sides of the rule on which a name stands.
@@ -246,12 +275,16 @@ mod tests {
             names.intern(texts[0]);
             names.intern(texts[5]);
             let mut rules = Rules::default();
-            rules.set(list.clone(), &mut names);
+            rules.set(list.clone(), &mut names, &mut || {});
             let ids = texts.map(|t| names.intern(t));
             for other in 0..others {
                 names.intern(&format!("other_{other}"));
             }
             rules.sync(&names);
+            let sides =
+                |sided: &[(u32, u8)]| sided.iter().map(|(_, sides)| sides.count_ones()).sum();
+            let kept = rules.of_name.iter().map(|of| -> u32 { sides(&of.sided) });
+            assert_eq!(rules.matches(), kept.sum::<u32>() as usize);
             assert_as_list(&rules, &list, &texts, &ids);
         }
     }

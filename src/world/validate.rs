@@ -36,6 +36,11 @@ impl World {
         if (bends, grow) != (self.deforming.len(), self.growing.len()) {
             return Err("a body that deforms, or whose reach grows, is lost".to_owned());
         }
+        let roots = self.bodies().map(|(slot, _)| slot);
+        let roots = roots.map(|slot| (slot, self.entries[slot.index()].root));
+        if !self.attached.are_whole(roots) {
+            return Err("a body hangs on another, or not, by mistake".to_owned());
+        }
         if by_status != self.by_status {
             return Err("the tallies by status are off".to_owned());
         }
@@ -137,8 +142,13 @@ impl World {
             !body.in_broad || placed,
             "it is in the broad phase without a pose",
         )?;
-        let hangs = self.attached.binary_search(&slot).is_ok();
-        let rooted = (entry.root != slot) == hangs;
-        check(rooted, "it hangs on a body, or not, by mistake")
+        let Some(root) = self.body(entry.root).filter(|_| entry.root != slot) else {
+            return check(entry.root == slot, "what it hangs on is gone");
+        };
+        let age = |body: &Body| (body.since_ns, body.received_ns, body.stamp_ns, body.reject);
+        check(
+            age(body) == age(root) && body.pose == root.pose * entry.root_pose,
+            "it is not where, or as old as, what it hangs on says",
+        )
     }
 }

@@ -727,3 +727,25 @@ fn bug_an_attachment_without_a_place_names_the_key_to_write() {
     let text = bench.refused(&[attach("lamp", None, place)]);
     assert!(text.contains("leave out `position`"), "{text}");
 }
+
+/// It hangs on a body that no source moves by then, so a reset of the source has nothing to do with it.
+#[test]
+fn bug_a_body_hung_on_another_was_reset_with_the_source_that_the_same_request_took_it_from() {
+    let bodies = vec![fixed("base", 1, 0.0), moving("b", 2), moving("c", 3)];
+    let mut bench = Bench::of(bodies);
+    bench.send(MS, "sim", 1, &[row(2, 2.0), row(3, 5.0)]);
+    let reset = Edit::Reset {
+        source: Some(named("sim")),
+    };
+    bench.world.begin_tick(2 + bench.tick, bench.now_ns);
+    let request = [attach("b", Some("base"), None), reset];
+    bench.world.apply(&request).unwrap();
+    bench.world.age(bench.now_ns);
+    bench.world.validate().unwrap();
+    assert_eq!(
+        (bench.removed("b"), bench.removed("c")),
+        (None, Some(EndCause::Reset))
+    );
+    assert_eq!(bench.status("b"), BodyStatus::Known);
+    assert_eq!(bench.status("c"), BodyStatus::NotReceived);
+}

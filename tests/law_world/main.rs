@@ -17,3 +17,4 @@ mod rules;
 mod sources;
 mod support;
 mod unknown;
+mod vertices;

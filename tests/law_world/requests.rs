@@ -1,16 +1,14 @@
 //! Requests of several edits: each finds the scene as those before it made it.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use sweepd::ids::BodyId;
 use sweepd::math::Pose;
 use sweepd::scene::BodySpec;
-use sweepd::shape::{ShapeSpec, build};
 use sweepd::wire::BodyStatus;
-use sweepd::world::{Edit, Parts, PlacedShape, Put};
+use sweepd::world::{Edit, Put};
 
-use crate::support::{Bench, MS, cube, fixed, moving, row};
+use crate::support::{Bench, MS, cloth, cube, fixed, moving, row};
 
 fn put(spec: BodySpec) -> Edit {
     Edit::Put(Put {
@@ -153,34 +151,6 @@ fn bug_a_body_put_on_another_counted_as_where_it_hangs_of_the_scene() {
     let edits = [put(hung("g", "x", 1.0)), attach("g", "floor", None)];
     request(&mut bench, &edits);
     assert_eq!(x_of(&bench, "g"), 6.0);
-}
-
-/// A sheet that deforms.
-fn cloth() -> Edit {
-    let mesh = ShapeSpec::Trimesh {
-        vertices: vec![
-            [0.0, 0.0, 0.0],
-            [1.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0],
-            [1.0, 1.0, 0.0],
-        ],
-        faces: vec![[0, 1, 2], [1, 3, 2]],
-        file: None,
-        scale: None,
-        solid: Some(false),
-    };
-    let shape = build(&mesh, Path::new("")).unwrap().shape;
-    let shape = shape.to_deforming().unwrap();
-    Edit::Put(Put {
-        body: Arc::new(BodySpec {
-            deforms: true,
-            ..moving("cloth", 0)
-        }),
-        shapes: Parts::from([PlacedShape {
-            shape: Arc::new(shape),
-            pose: Pose::identity(),
-        }]),
-    })
 }
 
 #[test]

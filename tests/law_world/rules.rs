@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use sweepd::limits::PATTERN_MATCHES_MAX;
 use sweepd::math::Pose;
 use sweepd::scene::{BodySpec, PairAction, PairRule};
 use sweepd::world::{Edit, Parts, Put, World};
@@ -192,4 +193,50 @@ fn long_requests_of_rules_and_many_groups_take_no_longer_than_reading_them() {
     println!("47,500 attached pairs: {took:?}");
     assert_eq!(bench.world.ignored_pairs_count(), 47_500);
     assert!(took.as_millis() < 1000);
+}
+
+/// What a pattern matches is kept for each rule: beyond a bound a request is refused whole, whether it brings rules or
+/// names, and a scene is too. Before, one that fitted into a message could hold the daemon up for minutes.
+#[test]
+fn bug_what_pair_rules_with_patterns_match_was_without_bound() {
+    const NAMES: u64 = 3000;
+    let ignore = |k: u64| rule(PairAction::Ignore, "*", &format!("b{k}"));
+    let rules = |count: u64| (1..=count).map(ignore);
+    let edits = |count: u64| rules(count).map(Edit::Rule).collect::<Vec<_>>();
+    let bodies = || -> Vec<BodySpec> { (1..=NAMES).map(|k| moving(&format!("b{k}"), k)).collect() };
+    let mut world = Bench::with_rules(bodies(), Vec::new()).world;
+    // Each matches every name once, and one of them twice.
+    let most = PATTERN_MATCHES_MAX as u64 / (NAMES + 1);
+    let rev = world.scene_rev();
+    let why = world.apply(&edits(most + 1)).unwrap_err();
+    assert!(why.contains("write fewer rules"), "{why}");
+    assert_eq!((world.scene_rev(), world.filters().rules_count()), (rev, 0));
+    let mut steps = 0;
+    let applied = world.apply_stepwise(&edits(most), &mut || steps += 1);
+    assert!(applied.unwrap().changed);
+    // Each is looked at, counted, applied and compiled.
+    assert_eq!(steps, 4 * most);
+    // There is room for one more name of all of these.
+    let more = |k: u64| put(moving(&format!("more{k}"), 0));
+    assert!(
+        world
+            .apply(&[more(1), more(2)])
+            .unwrap_err()
+            .contains("fewer rules")
+    );
+    world.apply(&[more(1)]).unwrap();
+    assert!(world.apply(&[more(2)]).unwrap_err().contains("fewer rules"));
+    // The same request may give up some of them.
+    let drop = |k: u64| Edit::DropRules {
+        a: "*".to_owned(),
+        b: format!("b{k}"),
+    };
+    world.apply(&[more(2), drop(1), drop(2)]).unwrap();
+
+    let scene = scene(bodies(), rules(most + 1).collect());
+    let shapes = scene.bodies.iter().map(|_| cube()).collect();
+    let why = World::new(&scene, shapes, START_NS)
+        .unwrap_err()
+        .to_string();
+    assert!(why.contains("write fewer rules"), "{why}");
 }

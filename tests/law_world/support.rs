@@ -53,6 +53,36 @@ pub(crate) fn cube() -> Parts {
     }])
 }
 
+/// A sheet that deforms.
+pub(crate) fn cloth() -> Edit {
+    let mesh = ShapeSpec::Trimesh {
+        vertices: vec![
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [1.0, 1.0, 0.0],
+        ],
+        faces: vec![[0, 1, 2], [1, 3, 2]],
+        file: None,
+        scale: None,
+        solid: Some(false),
+    };
+    let shape = sweepd::shape::build(&mesh, std::path::Path::new(""))
+        .unwrap()
+        .shape;
+    let shape = shape.to_deforming().unwrap();
+    Edit::Put(sweepd::world::Put {
+        body: Arc::new(BodySpec {
+            deforms: true,
+            ..moving("cloth", 0)
+        }),
+        shapes: Parts::from([PlacedShape {
+            shape: Arc::new(shape),
+            pose: Pose::identity(),
+        }]),
+    })
+}
+
 /// A half-space.
 pub(crate) fn floor() -> Parts {
     let everywhere = Point::new(f64::INFINITY, f64::INFINITY, f64::INFINITY);

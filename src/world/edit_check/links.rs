@@ -178,7 +178,7 @@ impl<'a> Draft<'a> {
             }
         }
         let world = self.world;
-        let hung = world.attached.iter();
+        let hung = world.attached.slots().iter();
         let hung = hung.filter_map(|slot| Some(&*world.body(*slot)?.name));
         let edited = self.bodies.iter();
         let edited = edited.filter(|(_, body)| body.is_some_and(|body| body.hangs.is_some()));

@@ -1,7 +1,11 @@
 //! Edits of pair rules, looked at before anything is applied. In: one edit. Out: nothing, or what is wrong.
 
+use std::collections::BTreeMap;
+
 use super::super::rule_draft::RuleDraft;
+use super::super::rules::has_pattern;
 use super::Draft;
+use crate::limits::PATTERN_MATCHES_MAX;
 use crate::scene::{PairRule, is_pattern, literal_ends, pattern_matches};
 
 /// Most pair rules. Every new name is matched with each rule that has a pattern.
@@ -20,10 +24,8 @@ impl<'a> Draft<'a> {
         let there = |text: &str| !matches!(self.bodies.get(text), Some(None));
         let (head, _) = literal_ends(pattern);
         let put = || {
-            let from_head = self.bodies.range(head..);
-            from_head
-                .take_while(|(name, _)| name.starts_with(head))
-                .any(|(name, body)| body.is_some() && pattern_matches(pattern, name))
+            let from_head = self.bodies.range(head..).map(|(name, _)| *name);
+            matching(from_head, pattern).any(there)
         };
         let mut known = world.names.matching(pattern).map(|n| world.names.get(n));
         let any = known.any(|n| n.slot.is_some() && there(&n.text)) || put();
@@ -62,6 +64,50 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
+    /// Whether the rules with patterns match few enough names in all, those included that the request brings.
+    ///
+    /// * `step` - called after each such rule.
+    pub(super) fn patterns_hold(&self, step: &mut dyn FnMut()) -> Result<(), String> {
+        let (names, rules) = (&self.world.names, &self.world.filters.rules);
+        let brought = self.bodies.keys().copied();
+        let brought = brought.filter(|name| names.find_name(name).is_none());
+        let mut brought: Vec<&str> = brought.collect();
+        if self.rules.is_none() {
+            // Of requests of the same tick.
+            let unmatched = names.all().get(rules.names_len()..).unwrap_or_default();
+            brought.extend(unmatched.iter().map(|name| &*name.text));
+            brought.sort_unstable();
+        }
+        let count_brought = |pattern: &str| {
+            let (head, _) = literal_ends(pattern);
+            let first = brought.partition_point(|name| *name < head);
+            matching(brought[first..].iter().copied(), pattern).count()
+        };
+        let (those, mut matches): (Vec<&PairRule>, usize) = match &self.rules {
+            None if brought.is_empty() => return Ok(()),
+            None => (rules.patterned().collect(), rules.matches()),
+            Some(draft) => (draft.iter().filter(|rule| has_pattern(rule)).collect(), 0),
+        };
+        // Many rules have a side in common.
+        let mut of_side: BTreeMap<&str, usize> = BTreeMap::new();
+        for rule in those {
+            for side in [&*rule.a, &*rule.b] {
+                matches += *of_side.entry(side).or_insert_with(|| {
+                    let known = self.rules.as_ref().map(|_| names.matching(side).count());
+                    known.unwrap_or_default() + count_brought(side)
+                });
+            }
+            step();
+            if matches > PATTERN_MATCHES_MAX {
+                return Err(format!(
+                    "up to the rule for `{}` and `{}` the pair rules with patterns match more than {PATTERN_MATCHES_MAX} names, each counted for each rule: write fewer rules, or narrower patterns",
+                    rule.a, rule.b
+                ));
+            }
+        }
+        Ok(())
+    }
+
     pub(super) fn look_at_drop(&mut self, a: &'a str, b: &'a str) -> Result<(), String> {
         if self.rules().drop_of(a, b).is_empty() {
             return Err(format!(
@@ -70,4 +116,15 @@ impl<'a> Draft<'a> {
         }
         Ok(())
     }
+}
+
+/// Of names in order that begin at the pattern's literal beginning, those that it matches.
+fn matching<'n>(
+    from_head: impl Iterator<Item = &'n str>,
+    pattern: &str,
+) -> impl Iterator<Item = &'n str> {
+    let (head, _) = literal_ends(pattern);
+    from_head
+        .take_while(move |name| name.starts_with(head))
+        .filter(move |name| pattern_matches(pattern, name))
 }
