@@ -228,8 +228,10 @@ fn bug_the_watchdog_ended_a_daemon_without_a_word_where_the_log_was_held_up() {
     });
     assert_eq!(finish(child).status.code(), Some(5));
     let text = reader.join().unwrap();
-    let line = "sweepd: the tick thread makes no progress: the daemon ends, start it again\n";
-    assert!(text.ends_with(line), "{}", text.trim_start_matches('.'));
+    // The thread that was stuck may log more behind it before the process has ended.
+    let last = "sweepd: the tick thread makes no progress: the daemon ends, start it again";
+    let text = text.trim_start_matches('.');
+    assert!(text.lines().any(|line| line == last), "{text}");
 }
 
 #[test]
