@@ -189,7 +189,7 @@ pub(super) struct CourseArgs {
 
 impl CourseArgs {
     /// # Errors
-    /// `Error::Usage` for a rate that cannot be.
+    /// `Error::Usage` unless the rate is above 0 and at most 1e6 frames per second.
     pub(super) fn check(&self) -> crate::error::Result<()> {
         if self.rate > 0.0 && self.rate <= 1e6 {
             return Ok(());

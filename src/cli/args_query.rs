@@ -1,4 +1,4 @@
-//! Flags and arguments of `query`, and how lengths and lists of numbers are read.
+//! Flags and arguments of `query`, and the parsers of lengths, masks and lists of numbers.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -26,7 +26,7 @@ pub(super) struct QueryArgs {
     #[arg(long)]
     pub(super) json: bool,
     /// How long to wait for the daemon and its answer, such as `500ms`.
-    // `timeout` is what it was called before it was named as that of `feed`, `monitor` and `record`.
+    // The alias `timeout` is the former name. The present one is the same as that of `feed`, `monitor` and `record`.
     #[arg(
         long,
         alias = "timeout",
@@ -52,7 +52,7 @@ pub(super) struct QueryArgs {
         conflicts_with_all = ["a", "b", "touching", "shape", "ray", "instance", "json", "wait"]
     )]
     pub(super) batch: Option<PathBuf>,
-    // Last, for a heading goes on to all flags behind it.
+    // These groups come last: a help heading applies to all flags after it.
     #[command(flatten)]
     pub(super) touching: TouchingArgs,
     #[command(flatten)]
@@ -187,7 +187,7 @@ pub(super) struct ImpactArgs {
     pub(super) angular_b: Option<Numbers<3>>,
 }
 
-/// So many numbers, as one value of a flag.
+/// A flag value of exactly `N` finite numbers, separated by commas.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Numbers<const N: usize>(pub(super) [f64; N]);
 
@@ -201,7 +201,7 @@ impl<const N: usize> FromStr for Numbers<N> {
     }
 }
 
-/// Where something is put, as one value of a flag: a position in metres, and a quaternion in the order x, y, z, w.
+/// A flag value that places a body or shape: a position in metres and an optional quaternion in the order x, y, z, w.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Place {
     pub(super) position: [f64; 3],
@@ -229,7 +229,7 @@ impl FromStr for Place {
     }
 }
 
-/// Reads finite numbers with commas between them.
+/// Parses finite numbers separated by commas.
 fn numbers(text: &str) -> Result<Vec<f64>, String> {
     let number = |part: &str| {
         let value: Option<f64> = part.trim().parse().ok();
@@ -240,7 +240,7 @@ fn numbers(text: &str) -> Result<Vec<f64>, String> {
     text.split(',').map(number).collect()
 }
 
-/// Bits as scene files have them: `0x6`, `0b110`, `6`.
+/// Parses a 32-bit mask as in scene files: `0x6`, `0b110`, `6`.
 fn bits(text: &str) -> Result<u32, String> {
     let number = match text.split_at_checked(2) {
         Some(("0x", hex)) => u32::from_str_radix(hex, 16),
@@ -251,7 +251,7 @@ fn bits(text: &str) -> Result<u32, String> {
         .map_err(|_| format!("`{text}` is not a mask of 32 bits: write a number such as 0x6 or 6"))
 }
 
-/// Metres of `5cm`, `1.5m`, `2mm`, `300um`, `0`.
+/// Parses a length into metres: `5cm`, `1.5m`, `2mm`, `300um`, `0`.
 pub(super) fn length_m(text: &str) -> Result<f64, String> {
     let wanted = || {
         format!(

@@ -1,4 +1,4 @@
-//! Flags and arguments of the commands that look, listen and tell: `record`, `list`, `doctor`, `completions`, `man`.
+//! Flags and arguments of the tool commands: `record`, `list`, `doctor`, `completions`, `man`.
 
 use std::path::PathBuf;
 

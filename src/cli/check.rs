@@ -1,4 +1,4 @@
-//! `sweepd check`: reads a scene as the daemon would, and says what it would do with it.
+//! `sweepd check`: reads a scene as the daemon does and prints the plan that the daemon would run.
 
 use serde_json::json;
 
@@ -13,14 +13,14 @@ use super::args::CheckArgs;
 use super::out::Out;
 use super::progress::shapes_of;
 
-/// Ignored pairs listed at most.
+/// Most ignored pairs that are listed.
 const IGNORED_SHOWN: usize = 10_000;
 
-/// What lines begin with that are no choice.
+/// Labels of output lines that are not choices of the plan.
 const LEFT_OUT: &str = "left out";
 const IGNORED: &str = "ignored pairs";
 
-/// Prints the plan, what was left out, ignored pairs and warnings.
+/// Prints the plan, the parts left out, ignored pairs, notes and warnings.
 pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
     let scene = Scene::load(&args.scene)?;
     let shapes = shapes_of(&scene, Library::new())?;
@@ -83,9 +83,9 @@ pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
     Ok(true)
 }
 
-/// The plan: what was chosen, what was left out, and how many pairs are ignored.
+/// Prints the plan: the choices, the parts left out, and the number of ignored pairs.
 fn tell_plan(plan: &Plan, ignored: u64, out: &mut Out) -> Result<()> {
-    // All parts in one column, however long their names are.
+    // All labels share one column, as wide as the longest label.
     let parts = plan.choices.iter().map(|choice| choice.part);
     let width = parts
         .chain([LEFT_OUT, IGNORED])
@@ -112,7 +112,7 @@ fn tell_plan(plan: &Plan, ignored: u64, out: &mut Out) -> Result<()> {
     out.line(&format!("  {IGNORED:<width$} {ignored}"))
 }
 
-/// The ignored pairs with their reasons, by id, and whether there are more.
+/// The ignored pairs with their reasons, ordered by id, and whether there are more than the list holds.
 fn ignored(world: &World) -> (Vec<(&str, &str, String)>, bool) {
     let bodies: Vec<(_, &Body)> = world.bodies().collect();
     let mut list = Vec::new();

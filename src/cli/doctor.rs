@@ -1,5 +1,5 @@
-//! `sweepd doctor`: what a user needs to know when nothing works. In: the machine, the files of this user, the daemons
-//! that run. Out: a line a finding: ok, warning or wrong; what; what to do.
+//! `sweepd doctor`: diagnoses why sweepd does not work. In: the machine, the files of this user, the running daemons.
+//! Out: one line per finding: ok, warning or wrong; what was found; the remedy.
 
 mod files;
 mod instance;
@@ -18,14 +18,14 @@ use super::args_tools::DoctorArgs;
 use super::figures::bytes;
 use super::out::Out;
 
-/// How much a finding matters.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Level {
-    /// As it should be.
+    /// No problem.
     Ok,
-    /// It may become a trouble, or hinders what not everybody needs.
+    /// A possible future problem, or one of a feature that not everybody uses.
     Warning,
-    /// Something does not work because of it.
+    /// A problem that breaks something.
     Wrong,
 }
 
@@ -39,15 +39,15 @@ impl Level {
     }
 }
 
-/// One line.
+/// One finding, printed as one line.
 #[derive(Clone, Debug)]
 struct Finding {
     level: Level,
-    /// What was looked at.
+    /// Name of the check.
     check: &'static str,
-    /// What is so.
+    /// What was found.
     what: String,
-    /// What to do about it; empty: nothing.
+    /// The remedy; empty: none.
     mend: String,
 }
 
@@ -97,7 +97,7 @@ impl Finding {
     }
 }
 
-/// Looks at everything; `false` when something is wrong.
+/// Runs all checks; `false` if something is wrong.
 pub(super) fn doctor(args: &DoctorArgs, out: &mut Out) -> Result<bool> {
     let name = args.instance.as_deref();
     let place = Place::new(name.unwrap_or("default"))?.looking_only();
@@ -111,12 +111,12 @@ pub(super) fn doctor(args: &DoctorArgs, out: &mut Out) -> Result<bool> {
                 finding.text()
             })?;
         }
-        // An instance that does not answer takes seconds.
+        // Flushed after each check, since the check of an instance that does not answer takes seconds.
         out.flush()
     };
     tell(memory::look())?;
     tell(limits::look())?;
-    // Who cannot open files takes what is there for missing.
+    // Without free file descriptors existing files would seem missing, so the other checks are skipped.
     if let Some(blind) = limits::blind() {
         tell(vec![blind])?;
         return Ok(false);
@@ -130,9 +130,10 @@ pub(super) fn doctor(args: &DoctorArgs, out: &mut Out) -> Result<bool> {
     Ok(nothing_wrong)
 }
 
-/// The instances to look at: the one asked for, or all that are held or waited at.
+/// The instances to check: the given one, or all with a lock holder or with clients; if there are none, that of
+/// `place`.
 fn instances(place: &Place, name: Option<&str>) -> Vec<InstanceInfo> {
-    // Where neither can be read, the files have said so.
+    // Errors are ignored here: the checks of files have reported them.
     let mut all = list_instances(place).unwrap_or_default();
     for lock in locks(place).unwrap_or_default() {
         if let Some(holder) = lock.holder

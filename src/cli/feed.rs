@@ -1,4 +1,4 @@
-//! `sweepd feed`: a built-in source of moving bodies, and the maker of scenes for it.
+//! `sweepd feed`: a built-in source of moving bodies, and a generator of scenes for it.
 
 mod cadence;
 mod same;
@@ -19,11 +19,12 @@ use super::files::Draft;
 use super::out::Out;
 use same::Same;
 
-/// Bodies of a written scene when no count is given.
+/// Bodies of a generated scene if no count is given.
 const COUNT_DEFAULT: usize = 200;
-/// Longest sleep between two looks at the stop flag, nanoseconds.
+/// Longest sleep between two checks of the stop flag, nanoseconds.
 const LOOK_NS: u64 = 50_000_000;
-/// Time between two looks at what the daemon says of our frames, nanoseconds.
+/// Time between two checks of what the daemon reports of our frames, nanoseconds; also the lateness above which the
+/// schedule is shifted, and the wait after the last frame.
 const HEED_NS: u64 = 1_000_000_000;
 
 /// Moves the bodies of a scene until stopped, or writes a scene.
@@ -80,7 +81,7 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
     Ok(true)
 }
 
-/// Sends frame after frame at the rate, until stopped or for the frames asked for.
+/// Sends frames at the rate, until stopped or until the requested number is sent.
 fn stream(
     args: &FeedArgs,
     source: &str,
@@ -114,7 +115,7 @@ fn stream(
             look_ns = now_ns.saturating_add(HEED_NS);
             heeded.look(client, source)?;
         }
-        // Stopped for a while: it goes on from here, with no burst of the frames that were missed.
+        // After a pause of the process, sending continues from now, without a burst of the missed frames.
         let late_ns = now_ns.saturating_sub(next_ns);
         if late_ns > HEED_NS {
             start_ns = start_ns.saturating_add(late_ns);
@@ -127,7 +128,7 @@ fn stream(
     Ok(())
 }
 
-/// After the last of a number of frames of which none was seen to be used: that none was is no good end.
+/// Waits after the last of a given number of frames, if none is known to be used. An unused run is an error.
 fn conclude(client: &mut Client, source: &str, sent: u64, stop: &AtomicBool) -> Result<()> {
     let clock = SystemClock;
     let mut until_ns = clock.monotonic_ns().saturating_add(HEED_NS);
@@ -142,7 +143,7 @@ fn conclude(client: &mut Client, source: &str, sent: u64, stop: &AtomicBool) -> 
         }
         match client.wait_tick(LOOK_NS)? {
             Heard::Silence => {}
-            // What takes long may still be the tick of these frames.
+            // A long tick may be the one that uses these frames.
             Heard::Tick if client.view().is_under_way() => {
                 until_ns = now_ns.saturating_add(HEED_NS);
             }
@@ -168,18 +169,18 @@ fn unused(source: &str, sent: u64, is_heard: bool) -> Error {
 /// Whether the daemon has used a frame of this session.
 fn uses(client: &Client, source: &str) -> bool {
     let view = client.view();
-    // A tick that is under way tells no sources.
+    // A tick under way has no source rows.
     !view.is_under_way() && used(view.tick(), client.session(), source).is_some_and(|n| n > 0)
 }
 
-/// Frames of this session that the daemon has used; `None`: another session speaks for the source, or none.
+/// Number of frames of this session that the daemon has used; `None`: the source has no session, or another one.
 fn used(tick: &TickRow, session: u64, source: &str) -> Option<u64> {
     let mut own = tick.sources.iter().take(usize::from(tick.sources_len));
     own.find(|row| name_str(&row.name) == Some(source) && row.session == session)
         .map(|row| row.frames)
 }
 
-/// When a frame is, from the start: seconds and nanoseconds.
+/// Time of a frame from the start: seconds and nanoseconds.
 fn moment(frame: u64, rate_hz: f64) -> (f64, u64) {
     #[allow(
         clippy::cast_precision_loss,
@@ -195,7 +196,7 @@ fn moment(frame: u64, rate_hz: f64) -> (f64, u64) {
     (time_s, time_ns)
 }
 
-/// What the daemon said last, so that a change is told once.
+/// Last reports of the daemon, so that each change is logged once.
 #[derive(Debug, Default)]
 struct Heeded {
     boot_id: u64,
@@ -208,7 +209,7 @@ struct Heeded {
 }
 
 impl Heeded {
-    /// Says on stderr what a person who feeds would want to know: silence, a restart, frames that are not used.
+    /// Logs warnings for the user: silence, a restart, refused or unused frames.
     fn look(&mut self, client: &mut Client, source: &str) -> Result<()> {
         while client.latest()? != Heard::Silence {}
         if client.view().is_under_way() {
@@ -224,7 +225,7 @@ impl Heeded {
         }
         if self.boot_id != 0 && boot_id != self.boot_id {
             tracing::warn!("the daemon restarted");
-            // Its first tick may have been made before a frame came.
+            // The first tick after a restart may precede the first frame.
             *self = Self {
                 boot_id,
                 tick: number,
@@ -265,7 +266,7 @@ impl Heeded {
     }
 }
 
-/// The place of the source to be.
+/// Index of the source to send as: the named one, or the first.
 fn source_of(scene: &Scene, name: Option<&str>) -> Result<usize> {
     let names = || {
         scene
@@ -293,7 +294,7 @@ fn source_of(scene: &Scene, name: Option<&str>) -> Result<usize> {
     }
 }
 
-/// The rows to send and how they move.
+/// The rows to send and their motions.
 struct Bodies {
     same: Same,
     rows: Vec<TransformRow>,
@@ -345,7 +346,7 @@ impl Bodies {
     }
 }
 
-/// Sleeps until a moment of `CLOCK_MONOTONIC`, with a look at the stop flag now and then.
+/// Sleeps until a time of `CLOCK_MONOTONIC`, or until stopped; checks the stop flag at least each `LOOK_NS`.
 fn sleep_until(clock: &dyn Clock, until_ns: u64, stop: &AtomicBool) {
     loop {
         let now_ns = clock.monotonic_ns();

@@ -1,10 +1,11 @@
-//! Names, numbers and times in few columns, for people. In: what the daemon says. Out: text without control characters.
+//! Names, numbers and times in few columns, for users. In: values from the daemon. Out: text without control
+//! characters.
 
-/// A name in so many columns at most; the end, which tells alike names apart, stays.
+/// Cuts the middle out of a name longer than `width` columns; the end stays, since it tells similar names apart.
 #[cfg(any(feature = "tui", test))]
 pub(super) fn cut(name: &str, width: usize) -> String {
     let len = name.chars().count();
-    // A name is the sender's word: what would move the cursor is not shown.
+    // A name comes from the sender: control characters could move the cursor.
     let mut clean = name.chars().map(|c| if c.is_control() { '?' } else { c });
     if len <= width {
         return clean.collect();
@@ -17,7 +18,7 @@ pub(super) fn cut(name: &str, width: usize) -> String {
     short
 }
 
-/// A number in few columns; what is not known is a dash, what has no end says so.
+/// A number in few columns: a dash if it is NaN (unknown), `inf` if it is infinite.
 #[cfg(any(feature = "tui", test))]
 pub(super) fn number(value: f64, digits: usize) -> String {
     if value.is_nan() {
@@ -29,7 +30,7 @@ pub(super) fn number(value: f64, digits: usize) -> String {
     }
 }
 
-/// A number in so many columns, with as many digits as have room behind its point.
+/// A number in at most `width` columns, with as many of `digits` decimals as fit; else in exponent form.
 #[cfg(any(feature = "tui", test))]
 pub(super) fn number_within(value: f64, digits: usize, width: usize) -> String {
     let mut told = (0..=digits).rev().map(|digits| number(value, digits));
@@ -37,7 +38,7 @@ pub(super) fn number_within(value: f64, digits: usize, width: usize) -> String {
         .unwrap_or_else(|| format!("{value:.0e}"))
 }
 
-/// Metres to the last digit that f64 has: intervals of a proof differ in those.
+/// Metres with all digits of the f64: the ends of a proved interval may differ in the last ones only.
 pub(super) fn metres(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 || (1e-4..1e9).contains(&size) {
@@ -53,7 +54,7 @@ pub(super) fn seconds(ns: u64) -> f64 {
     ns as f64 / 1e9
 }
 
-/// Nanoseconds for people.
+/// Nanoseconds as text with a unit.
 pub(super) fn time(ns: u64) -> String {
     #[allow(clippy::cast_precision_loss, reason = "shown with three digits")]
     let ns = ns as f64;
@@ -65,7 +66,7 @@ pub(super) fn time(ns: u64) -> String {
     }
 }
 
-/// Bytes for people.
+/// Bytes as text with a unit.
 pub(super) fn bytes(count: u64) -> String {
     #[allow(clippy::cast_precision_loss, reason = "shown with four digits")]
     let size = count as f64;

@@ -1,5 +1,5 @@
-//! Files that commands write. In: a path of a user. Out: an open file, or why there is none. What a command reads it
-//! does not write over.
+//! Files that commands write. In: a path from the user. Out: an open file, or the reason why there is none. No command
+//! overwrites a file that it reads.
 
 mod draft;
 
@@ -13,7 +13,7 @@ use crate::scene::Scene;
 
 pub(super) use draft::Draft;
 
-/// A file that a command reads: what it is to it, in words, and its path.
+/// A file that a command reads: its role in words, and its path.
 pub(super) type Input = (&'static str, PathBuf);
 
 /// The files that a scene is read from.
@@ -24,12 +24,12 @@ pub(super) fn inputs(path: &Path, scene: &Scene) -> Vec<Input> {
         .collect()
 }
 
-/// Refuses to write over what is read, by whatever name: another spelling, a symbolic link or a hard link.
+/// Refuses to overwrite a file that is read, also by another spelling, a symbolic link or a hard link.
 ///
-/// * `flag` - that names the file `to`.
+/// * `flag` - the flag that names the file `to`.
 ///
 /// # Errors
-/// `Error::Usage` with the names of both.
+/// `Error::Usage` with both paths.
 pub(super) fn check_inputs(flag: &str, to: &Path, inputs: &[Input]) -> Result<()> {
     let there = place(to);
     let is_same = |(_, path): &&Input| there.is_some() && place(path) == there;
@@ -43,27 +43,27 @@ pub(super) fn check_inputs(flag: &str, to: &Path, inputs: &[Input]) -> Result<()
     }
 }
 
-/// Which file a path leads to; `None`: there is none, or what keeps nothing (a device, a pipe).
+/// Device and inode of a file; `None`: there is no file, or it keeps no content (a device, a pipe).
 fn place(path: &Path) -> Option<(u64, u64)> {
     let meta = std::fs::metadata(path).ok()?;
     meta.is_file().then(|| (meta.dev(), meta.ino()))
 }
 
-/// Opens a new file for a recording; one that is there is somebody's work. It is locked until it is closed, so that no
-/// other of these commands writes into it.
+/// Opens a new file for a recording; an existing one may be somebody's work. The file is locked until it is closed, so
+/// that no other of these commands writes to it.
 ///
-/// * `over` - whether one that is there is written over.
-/// * `what` - it is for, in words.
+/// * `over` - whether an existing file is overwritten.
+/// * `what` - purpose of the file, in words.
 ///
 /// # Errors
-/// `Error::Refused` when it is there, is being written, or is no file (a folder, a pipe, a device), `Error::Io` when it
-/// cannot be opened.
+/// `Error::Refused` if the file exists without `over`, is being written, or is not a regular file (a folder, a pipe, a
+/// device); `Error::Io` if it cannot be opened.
 #[cfg_attr(
     not(feature = "mcap"),
     allow(dead_code, reason = "this build does not record")
 )]
 pub(super) fn open_new(path: &Path, over: bool, what: &str) -> Result<File> {
-    // Before it is opened: that waits for who reads a pipe.
+    // Checked before the open, which would block until a pipe has a reader.
     if let Ok(there) = std::fs::metadata(path)
         && !there.is_file()
     {
@@ -79,7 +79,7 @@ pub(super) fn open_new(path: &Path, over: bool, what: &str) -> Result<File> {
     }
     let failed = |e| unopened(path, what, e);
     let mut how = File::options();
-    // Emptied once it is known that nobody else is writing it.
+    // Truncated only after the lock shows that no other process writes it.
     how.write(true)
         .create(over)
         .create_new(!over)
@@ -93,7 +93,7 @@ pub(super) fn open_new(path: &Path, over: bool, what: &str) -> Result<File> {
             "{} is being written by another process: name another file, or end that one first",
             path.display()
         ))),
-        // There are file systems without locks.
+        // Some file systems have no locks.
         Ok(()) | Err(TryLockError::Error(_)) => {
             file.set_len(0).map_err(failed)?;
             Ok(file)
@@ -101,7 +101,7 @@ pub(super) fn open_new(path: &Path, over: bool, what: &str) -> Result<File> {
     }
 }
 
-/// Why one that is there is not written over.
+/// The refusal to overwrite an existing file.
 fn is_there(path: &Path) -> Error {
     Error::Refused(format!(
         "{} exists: name another file, or overwrite it with --force",
@@ -152,7 +152,7 @@ mod tests {
         for name in ["other", "new", "gone"] {
             check_inputs("--record", &at(name), &read).unwrap();
         }
-        // A device keeps nothing, so that nothing of it is lost.
+        // A device keeps no content, so nothing is lost.
         let null = [("the scene file", PathBuf::from("/dev/null"))];
         check_inputs("--record", Path::new("/dev/null"), &null).unwrap();
         std::fs::remove_dir_all(&folder).unwrap();

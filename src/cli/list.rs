@@ -8,10 +8,10 @@ use crate::transport::iceoryx::{InstanceInfo, Place, list_instances};
 use super::args_tools::ListArgs;
 use super::out::Out;
 
-/// Lists the instances of this user: daemons, and names that clients wait at for one.
+/// Lists the instances of this user: daemons, and names at which clients wait for a daemon.
 pub(super) fn list(args: &ListArgs, out: &mut Out) -> Result<bool> {
     let mut instances = list_instances(&Place::new("default")?)?;
-    // What a killed daemon left behind runs no more; the next node on this machine cleans it up.
+    // Leftovers of a killed daemon are not listed; the next node on this machine removes them.
     instances.retain(|i| i.pid.is_some() || i.sources + i.readers > 0);
     for instance in &instances {
         out.line(&if args.json {

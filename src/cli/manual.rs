@@ -1,5 +1,5 @@
-//! `sweepd completions` and `sweepd man`, and what stands below `sweepd --help`. In: the flags themselves, and lists
-//! that stand here. Out: text for shells, `man` and people.
+//! `sweepd completions`, `sweepd man`, and the text below `sweepd --help`. In: the flags, and the lists in this file.
+//! Out: text for shells, `man` and users.
 
 use std::path::Path;
 
@@ -17,10 +17,10 @@ use super::out::Out;
 /// The name of the binary.
 const NAME: &str = "sweepd";
 
-/// What each part of a page begins with: an apostrophe that is none of typography.
+/// Preamble of each part of a page: it defines a plain, not a typographic, apostrophe.
 const PREAMBLE: &str = ".ie \\n(.g .ds Aq \\(aq\n.el .ds Aq '\n";
 
-/// What to try, by what for: command lines and what they do.
+/// Example command lines and what they do, grouped by purpose.
 const EXAMPLES: [(&str, &[(&str, &str)]); 3] = [
     (
         "Try it, in three terminals",
@@ -89,7 +89,7 @@ const ENVIRONMENT: [(&str, &str); 4] = [
     ),
 ];
 
-/// What stands below the list of commands.
+/// The text below the list of commands.
 pub(super) fn after_help() -> String {
     let mut text = String::new();
     for (what, lines) in EXAMPLES {
@@ -108,14 +108,14 @@ pub(super) fn after_help() -> String {
     )
 }
 
-/// Writes the completions of a shell.
+/// Prints the completions of a shell.
 pub(super) fn completions(args: &CompletionsArgs, out: &mut Out) -> Result<bool> {
     let shell = match args.shell {
         Shell::Bash => clap_complete::Shell::Bash,
         Shell::Zsh => clap_complete::Shell::Zsh,
         Shell::Fish => clap_complete::Shell::Fish,
     };
-    // Into memory first: the generator does not expect that a pipe may close.
+    // Into memory first: the generator does not handle a closed pipe.
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), NAME, &mut text);
     out.text(&String::from_utf8_lossy(&text))?;
@@ -123,7 +123,7 @@ pub(super) fn completions(args: &CompletionsArgs, out: &mut Out) -> Result<bool>
     Ok(true)
 }
 
-/// Writes one page to standard output, or all into a directory.
+/// Prints one page to standard output, or writes all pages into a directory.
 pub(super) fn man(args: &ManArgs, out: &mut Out) -> Result<bool> {
     let cmd = built();
     if let Some(folder) = &args.out {
@@ -162,7 +162,7 @@ pub(super) fn man(args: &ManArgs, out: &mut Out) -> Result<bool> {
     Ok(true)
 }
 
-/// The command with all that its parts inherit.
+/// The command with its subcommands, each with its inherited flags.
 fn built() -> Command {
     let mut cmd = Cli::command().disable_help_subcommand(true);
     cmd.build();
@@ -180,7 +180,7 @@ fn write_all(cmd: &Command, folder: &Path) -> std::io::Result<()> {
 fn page(cmd: &Command) -> std::io::Result<String> {
     let man = Man::new(cmd.clone())
         .source(format!("{NAME} {}", env!("CARGO_PKG_VERSION")))
-        // Blank and not empty: the place of what follows counts.
+        // Blank, not empty: the fields of the title are positional.
         .date(" ")
         .manual("User Commands");
     let (mut text, is_top) = (Vec::new(), cmd.get_name() == NAME);
@@ -217,7 +217,7 @@ fn page(cmd: &Command) -> std::io::Result<String> {
     }
     roff.to_writer(&mut text)?;
     let text = String::from_utf8_lossy(&text);
-    // Each part defines this anew; once is enough.
+    // Each part repeats the preamble; once is enough.
     let mut parts = text.split(PREAMBLE);
     let first = parts.next().unwrap_or_default();
     Ok([first, PREAMBLE].into_iter().chain(parts).collect())
@@ -240,7 +240,7 @@ fn examples(roff: &mut Roff) {
 mod tests {
     use super::*;
 
-    /// The command and all beneath it.
+    /// The command and all its subcommands, at any depth.
     fn all(cmd: &Command) -> Vec<&Command> {
         let beneath = cmd.get_subcommands().flat_map(all);
         std::iter::once(cmd).chain(beneath).collect()

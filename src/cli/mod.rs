@@ -1,4 +1,4 @@
-//! The command line: what the user says, checked, and the exit codes it ends with.
+//! The command line: parsed and checked arguments, and the exit codes of the process.
 //!
 //! Exit codes: 0 done, 1 a check failed, 2 usage or bad input, 3 timed out, 4 refused or could not run, 5 watchdog, 101
 //! panic. A closed pipe is a normal end, and so is a terminal that hung up. Results go to stdout, logs to stderr.
@@ -50,7 +50,7 @@ pub fn main() -> ExitCode {
     let cli = match Cli::try_parse_from(words) {
         Ok(cli) => cli,
         Err(error) => {
-            // A help text that is cut off by a closed pipe has still been asked for and given.
+            // A help text that a closed pipe cuts off is still a success.
             let _ = error.print();
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
@@ -100,12 +100,12 @@ fn dispatch(command: Command, ros_words: Option<&[String]>) -> Result<ExitCode> 
     }
 }
 
-/// Longest try at a connection before a look at the stop flag, nanoseconds.
+/// Longest connection attempt between two checks of the stop flag, nanoseconds.
 const CONNECT_LOOK_NS: u64 = 250_000_000;
-/// How long a wait for a daemon may be before it is told, nanoseconds.
+/// A longer wait for a daemon is logged, nanoseconds.
 const CONNECT_TELL_NS: u64 = 500_000_000;
 
-/// Connects within `wait_ns`; `None`: stopped before a daemon was there.
+/// Connects within `wait_ns`; `None`: stopped before there was a connection.
 fn connect(
     instance: &str,
     source: Option<&str>,
@@ -119,7 +119,7 @@ fn connect(
     loop {
         let left_ns = until_ns.saturating_sub(clock.monotonic_ns());
         match Client::connect(instance, source, left_ns.min(CONNECT_LOOK_NS)) {
-            // A signal cuts off what iceoryx2 waits for, too, with another error.
+            // A signal also interrupts waits inside iceoryx2, with another error.
             Err(_) if stop.load(Ordering::Relaxed) => return Ok(None),
             Err(Error::TimedOut(_)) if left_ns > CONNECT_LOOK_NS => {
                 let waited_ns = clock.monotonic_ns().saturating_sub(start_ns);
@@ -133,7 +133,7 @@ fn connect(
     }
 }
 
-/// A panic says one line; it unwinds, so that transports close.
+/// Makes a panic print one line. It still unwinds, so that transports close.
 fn install_panic_line() {
     std::panic::set_hook(Box::new(|info| {
         let place = info.location().map(ToString::to_string).unwrap_or_default();
@@ -144,7 +144,7 @@ fn install_panic_line() {
     }));
 }
 
-/// * `asked` - the level said by name, which beats both flags.
+/// * `asked` - the level from `--ros-args`, which overrides both flags.
 fn start_log(verbose: u8, quiet: bool, asked: Option<LevelFilter>) {
     let level = asked.unwrap_or(match (quiet, verbose) {
         (true, _) => LevelFilter::ERROR,
@@ -157,9 +157,9 @@ fn start_log(verbose: u8, quiet: bool, asked: Option<LevelFilter>) {
         .with_writer(std::io::stderr)
         .with_ansi(out::coloured_stderr())
         .with_target(false)
-        // A log that cannot be written is told of there, which panics.
+        // The log would report a failed write to stderr, which panics if stderr fails.
         .log_internal_errors(false)
         .finish();
-    // A host that has a log of its own keeps it.
+    // A host program with its own log keeps it.
     let _ = tracing::subscriber::set_global_default(log);
 }

@@ -1,4 +1,4 @@
-//! `sweepd monitor`: what a running daemon says, as a screen or as JSON lines.
+//! `sweepd monitor`: shows the ticks of a running daemon on a screen or as JSON lines.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
@@ -16,14 +16,14 @@ use super::connect;
 use super::out::Out;
 use face::Face;
 
-/// Longest wait before a look at the stop flag, nanoseconds.
+/// Longest wait between two checks of the stop flag, nanoseconds.
 const LOOK_NS: u64 = 100_000_000;
 
-/// The daemon computes what somebody listens to, so the first ticks heard come without pairs: how long they are passed
-/// over until all that was asked for is there, nanoseconds.
+/// The daemon computes only what has readers, so the first ticks come without pairs. For at most this long ticks that
+/// lack requested rows are skipped, nanoseconds.
 const WHOLE_WAIT_NS: u64 = 1_000_000_000;
-/// Without a tick for so long the screen says so, nanoseconds: three heartbeats of the usual length; for a slower
-/// daemon twice the last time between two ticks.
+/// After this time without a tick the screen reports silence, nanoseconds: three heartbeats of the default length; for
+/// a slower daemon twice the last time between two ticks.
 const SILENCE_NS: u64 = 300_000_000;
 
 /// Follows an instance until stopped.
@@ -55,9 +55,9 @@ pub(super) fn monitor(args: &MonitorArgs, out: &mut Out) -> Result<bool> {
                 if heard_ns < whole_by_ns && !is_whole(client.view(), args) {
                     continue;
                 }
-                // Later ticks come as they are: what is overtaken in a queue is not waited for.
+                // Later ticks are shown as they come: rows that newer ones overtook in a queue are not waited for.
                 whole_by_ns = 0;
-                // One that is under way comes again, whole.
+                // A tick under way comes again when it is complete.
                 seen += u64::from(!client.view().is_under_way());
                 names.follow(client.view().names());
                 if !is_shown(client.view(), args) {
@@ -88,7 +88,7 @@ pub(super) fn monitor(args: &MonitorArgs, out: &mut Out) -> Result<bool> {
     Ok(true)
 }
 
-/// Whether a tick came with all that was asked for.
+/// Whether a tick came with all requested rows.
 fn is_whole(view: &View, args: &MonitorArgs) -> bool {
     view.names().is_some()
         && view.pairs().is_some()
@@ -96,7 +96,7 @@ fn is_whole(view: &View, args: &MonitorArgs) -> bool {
         && (args.json || view.bodies().is_some())
 }
 
-/// Whether a tick is shown: where lines are counted each is of a tick that has ended.
+/// Whether a tick is shown. Where JSON lines are counted, only complete ticks are.
 fn is_shown(view: &View, args: &MonitorArgs) -> bool {
     let are_counted = args.json && args.ticks.is_some();
     !(are_counted && view.is_under_way())
@@ -127,13 +127,13 @@ impl Names {
         }
     }
 
-    /// Characters of the longest.
+    /// Characters of the longest name.
     #[cfg(feature = "tui")]
     pub(super) fn longest(&self) -> usize {
         self.longest
     }
 
-    /// The name of a body, or its number.
+    /// The name of a body, or its id if the name is unknown.
     pub(super) fn of(&self, id: u64) -> String {
         self.by_id
             .get(&id)

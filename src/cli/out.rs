@@ -1,13 +1,13 @@
-//! Standard output that survives a closed pipe or a terminal that hung up, and complaints on stderr.
+//! Standard output that survives a closed pipe or a terminal that hung up, and error lines on stderr.
 
 use std::io::{ErrorKind, IsTerminal as _, Write};
 
 use crate::error::{Error, Result};
 
-/// Standard output. That its reader has gone is remembered: it ends the command normally.
+/// Standard output. It remembers that its reader is gone, which ends the command normally.
 pub(super) struct Out {
     sink: Box<dyn Write>,
-    /// It was a terminal at the start: one that hung up is none any more.
+    /// Whether it was a terminal at the start: one that hung up is not recognised as a terminal any more.
     is_terminal: bool,
     closed: bool,
 }
@@ -22,7 +22,7 @@ impl Out {
         }
     }
 
-    /// Writes a line and its end.
+    /// Writes a line and a newline.
     pub(super) fn line(&mut self, text: &str) -> Result<()> {
         let done = writeln!(self.sink, "{text}");
         self.take(done)
@@ -34,24 +34,24 @@ impl Out {
         self.take(done)
     }
 
-    /// Hands over what is buffered.
+    /// Flushes the buffer.
     pub(super) fn flush(&mut self) -> Result<()> {
         let done = self.sink.flush();
         self.take(done)
     }
 
-    /// The sink itself, for code that writes a stream of its own.
+    /// The sink itself, for code that writes its own stream.
     pub(super) fn sink(&mut self) -> &mut dyn Write {
         &mut self.sink
     }
 
-    /// What was written last, where a reader that has gone is no error, for what was found out is told by the exit
-    /// code, too.
+    /// The result of the last write. A reader that is gone is no error there, since the exit code also tells the
+    /// findings.
     pub(super) fn or_closed(&mut self, done: Result<()>) -> Result<()> {
         done.or_else(|e| if self.closed() { Ok(()) } else { Err(e) })
     }
 
-    /// Whether the reader has gone away.
+    /// Whether the reader is gone.
     pub(super) fn closed(&mut self) -> bool {
         self.closed || self.sink.flush().is_err_and(|e| self.is_gone(&e))
     }
@@ -63,7 +63,7 @@ impl Out {
         })
     }
 
-    /// Whether an error says that nobody reads any more. A file's EIO is a broken disk.
+    /// Whether an error means that the reader is gone. EIO on a file means a broken disk, not that.
     fn is_gone(&self, error: &std::io::Error) -> bool {
         let hung_up = rustix::io::Errno::IO.raw_os_error();
         error.kind() == ErrorKind::BrokenPipe
@@ -71,17 +71,17 @@ impl Out {
     }
 }
 
-/// One line on stderr; that it may be closed is nobody's fault.
+/// Writes one line to stderr; a closed stderr is ignored.
 pub(super) fn complain(text: &str) {
     let _ = writeln!(std::io::stderr(), "sweepd: {text}");
 }
 
-/// Whether stderr wants colours.
+/// Whether stderr gets colours.
 pub(super) fn coloured_stderr() -> bool {
     std::io::stderr().is_terminal() && colours_wanted()
 }
 
-/// Whether the environment leaves colours on.
+/// Whether the environment allows colours.
 pub(super) fn colours_wanted() -> bool {
     std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty())
 }

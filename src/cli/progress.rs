@@ -1,4 +1,4 @@
-//! A line on stderr that says how far long work is, where stderr is a terminal; nothing otherwise.
+//! A progress line on stderr for long work, if stderr is a terminal; nothing otherwise.
 
 use std::io::{IsTerminal as _, Write as _};
 
@@ -8,12 +8,12 @@ use crate::shape::Library;
 use crate::tick::build::{Shapes, build_shapes_in};
 use crate::time::{Clock as _, SystemClock};
 
-/// Time between two lines, nanoseconds.
+/// Least time between two updates of the line, nanoseconds.
 const LINE_NS: u64 = 100_000_000;
 /// Columns of the line.
 const COLUMNS: usize = 76;
 
-/// How far it is. The line is wiped when this is dropped.
+/// A progress line. It is erased when this is dropped.
 pub(super) struct Progress {
     shown: bool,
     next_ns: u64,
@@ -29,7 +29,7 @@ impl Progress {
         }
     }
 
-    /// Says it, now and then.
+    /// Shows the progress, at most once per `LINE_NS`.
     pub(super) fn tell(&mut self, done: u64, all: u64, what: &str) {
         let now_ns = SystemClock.monotonic_ns();
         if !self.shown || now_ns < self.next_ns {
@@ -46,7 +46,7 @@ impl Progress {
     }
 }
 
-/// The shapes of a scene, and how far they are: meshes may take a while.
+/// Builds the shapes of a scene and shows the progress: meshes may take a while.
 ///
 /// # Errors
 /// As [`build_shapes_in`].

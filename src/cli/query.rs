@@ -18,9 +18,9 @@ use super::args_query::QueryArgs;
 use super::out::Out;
 use super::progress::Progress;
 
-/// Answers what was asked; `false` when a line of a file could not be read.
+/// Answers the query; `false` if a line of a batch file could not be read.
 pub(super) fn query(args: &QueryArgs, out: &mut Out) -> Result<bool> {
-    // Signals end it as they end any process: nothing waits for it.
+    // A signal ends a batch like any process: there is nothing to close.
     if let Some(file) = &args.batch {
         return of_file(file, out);
     }
@@ -58,7 +58,7 @@ fn of_file(path: &Path, out: &mut Out) -> Result<bool> {
         if file.metadata().is_ok_and(|about| about.is_dir()) {
             return Err(is_none(&"this is a folder"));
         }
-        // Where the answers stand on the terminal themselves, they tell how far it is.
+        // Answers that are printed on a terminal show the progress themselves.
         if std::io::stdout().is_terminal() {
             Box::new(BufReader::new(file))
         } else {
@@ -70,7 +70,7 @@ fn of_file(path: &Path, out: &mut Out) -> Result<bool> {
     Ok(all_read)
 }
 
-/// A file of which it is told how much has been read.
+/// A file whose reading shows a progress line.
 struct Followed {
     file: File,
     done: u64,

@@ -1,7 +1,7 @@
-//! `sweepd run --record FILE`: the file is opened once the daemon has its name, and begins with the engine's start; and
-//! `sweepd record FILE` beside a daemon (`heard`).
+//! `sweepd run --record FILE`: the file is opened once the daemon has its name, and begins with the engine's start.
+//! The module `heard` has `sweepd record FILE`, which records beside a daemon.
 //!
-//! A build without the feature `mcap` says so.
+//! A build without the feature `mcap` refuses both.
 
 #[cfg(feature = "mcap")]
 mod heard;
@@ -30,11 +30,11 @@ use crate::record::file::{McapSink, buffered};
 #[cfg(feature = "mcap")]
 use crate::record::{Recorder, Start};
 
-/// What a file is opened for.
+/// Purpose of the file, for error messages.
 #[cfg(feature = "mcap")]
 const WHAT: &str = "a recording";
 
-/// Says beforehand where a recording will end.
+/// Warns beforehand if a limit of the file size will end the recording.
 #[cfg(feature = "mcap")]
 fn tell_limit(name: &str) {
     if let Some(most) = rustix::process::getrlimit(rustix::process::Resource::Fsize).current {
@@ -46,7 +46,7 @@ fn tell_limit(name: &str) {
     }
 }
 
-/// What this build says that cannot record or replay.
+/// The refusal of a build that cannot record or replay.
 #[cfg(not(feature = "mcap"))]
 pub(super) fn unable(what: &str) -> Error {
     Error::Usage(format!(
@@ -54,16 +54,16 @@ pub(super) fn unable(what: &str) -> Error {
     ))
 }
 
-/// A recording that was asked for.
+/// The requested recording, if any.
 pub(super) struct Tape {
     #[cfg(feature = "mcap")]
     file: Option<(PathBuf, bool)>,
 }
 
 impl Tape {
-    /// What was asked for. Nothing is touched yet: a daemon that may not start leaves no file, and harms none.
+    /// The requested recording. No file is touched yet: a daemon that fails to start creates none and damages none.
     ///
-    /// * `read` - files that are not to be recorded over.
+    /// * `read` - files that must not be overwritten.
     #[cfg(feature = "mcap")]
     pub(super) fn of(args: &RunArgs, read: &[Input]) -> Result<Self> {
         if let Some(path) = &args.record {
@@ -73,7 +73,7 @@ impl Tape {
         Ok(Self { file })
     }
 
-    /// Refuses what this build does not have.
+    /// Refuses `--record`, which this build does not have.
     #[cfg(not(feature = "mcap"))]
     pub(super) fn of(args: &RunArgs, _: &[Input]) -> Result<Self> {
         match args.record {
@@ -82,7 +82,7 @@ impl Tape {
         }
     }
 
-    /// A library for the scene's shapes: one that keeps mesh files where they are recorded.
+    /// A library for the scene's shapes; it keeps the contents of mesh files if they are recorded.
     pub(super) fn library(&self) -> Library {
         #[cfg(feature = "mcap")]
         if self.file.is_some() {
@@ -91,9 +91,9 @@ impl Tape {
         Library::new()
     }
 
-    /// Begins the recording of a daemon that has run no tick.
+    /// Begins the recording of a daemon that has not run a tick yet.
     ///
-    /// * `text` - of the scene file; `files` - the mesh files that were read for it.
+    /// * `text` - text of the scene file; `files` - the mesh files that were read for it.
     #[cfg(feature = "mcap")]
     pub(super) fn begin(
         self,
@@ -114,7 +114,7 @@ impl Tape {
         Ok(())
     }
 
-    /// There is none.
+    /// Does nothing: this build does not record.
     #[cfg(not(feature = "mcap"))]
     pub(super) fn begin(
         self,

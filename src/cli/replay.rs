@@ -1,4 +1,4 @@
-//! `sweepd replay FILE`: the engine again on what was recorded, and the first tick that differs.
+//! `sweepd replay FILE`: runs the engine again on a recording, and reports the first tick that differs.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -9,10 +9,10 @@ use crate::error::{Error, Result, counted};
 use crate::record::file::{Ending, Read, Reader};
 use crate::record::{Difference, Facts, Replay, TIMES, Tally};
 
-/// What a replay found.
+/// Result of a replay.
 struct Found {
     facts: Facts,
-    /// Ticks run, compared or not.
+    /// Number of ticks run, whether compared or not.
     ticks: u64,
     tally: Tally,
     difference: Option<Difference>,
@@ -20,7 +20,7 @@ struct Found {
     ending: Option<Ending>,
 }
 
-/// Replays a recording; `false` when it differs, nothing was compared, or the file is damaged or ended early.
+/// Replays a recording; `false` if it differs, nothing was compared, or the file is damaged or ended early.
 pub(super) fn replay(args: &ReplayArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
     let (from, until) = (args.from.unwrap_or(0), args.until.unwrap_or(u64::MAX));
     if from > until {
@@ -40,7 +40,7 @@ pub(super) fn replay(args: &ReplayArgs, out: &mut Out, stop: &AtomicBool) -> Res
 }
 
 impl Found {
-    /// Ticks that were compared, either way.
+    /// Number of ticks compared, bit by bit or by the law.
     fn compared(&self) -> u64 {
         self.tally.exact + self.tally.lawful
     }

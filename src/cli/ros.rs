@@ -1,6 +1,7 @@
-//! `sweepd run --ros2`: what was asked of ROS 2, checked, and the node beside the daemon's door.
+//! `sweepd run --ros2`: the checked ROS 2 settings, and the node as a door of the daemon.
 //!
-//! A build without the feature `ros2` says so; with it and not asked for, no thread and no socket is there.
+//! A build without the feature `ros2` refuses the flags. With it, but without the flags, there is no thread and no
+//! socket.
 
 use std::ffi::OsString;
 
@@ -22,14 +23,14 @@ use crate::transport::ros2::{
     LastingNode, RosNode, RosOptions, RosScene, RosSourceSpec, args::RosArgs, env::Network,
 };
 
-/// The node, where one was asked for.
+/// The ROS 2 node, if requested.
 #[cfg(feature = "ros2")]
 pub(super) type Node = LastingNode;
-/// There is none in this build.
+/// This build has no node.
 #[cfg(not(feature = "ros2"))]
 pub(super) type Node = std::convert::Infallible;
 
-/// Takes the sections `--ros-args .. [--]` out of a command line.
+/// Takes the sections `--ros-args .. [--]` out of a command line; returns the other words and those of the sections.
 pub(super) fn split(words: impl Iterator<Item = OsString>) -> (Vec<OsString>, Option<Vec<String>>) {
     let (mut plain, mut ros, mut inside) = (Vec::new(), None::<Vec<String>>, false);
     for word in words {
@@ -48,7 +49,7 @@ pub(super) fn split(words: impl Iterator<Item = OsString>) -> (Vec<OsString>, Op
     (plain, ros)
 }
 
-/// The files that ROS arguments name.
+/// The parameter files that ROS arguments name.
 pub(super) fn inputs(ros_words: Option<&[String]>) -> impl Iterator<Item = Input> {
     let pairs = ros_words.unwrap_or_default().windows(2);
     pairs.filter_map(|pair| match pair {
@@ -57,7 +58,7 @@ pub(super) fn inputs(ros_words: Option<&[String]>) -> impl Iterator<Item = Input
     })
 }
 
-/// The level of the log that `--log-level` asks for; words that cannot be read are refused later.
+/// The log level that `--log-level` requests; `None` also for invalid arguments, which are refused later.
 #[cfg(feature = "ros2")]
 pub(super) fn log_level(ros_words: Option<&[String]>) -> Option<LevelFilter> {
     let args = RosArgs::parse(ros_words?).ok()?;
@@ -66,18 +67,18 @@ pub(super) fn log_level(ros_words: Option<&[String]>) -> Option<LevelFilter> {
         "info" => LevelFilter::INFO,
         "warn" => LevelFilter::WARN,
         "error" => LevelFilter::ERROR,
-        // What ends the daemon is told without the log.
+        // The error that ends the daemon is printed without the log.
         _ => LevelFilter::OFF,
     })
 }
 
-/// There is none.
+/// Always `None`: this build has no ROS arguments.
 #[cfg(not(feature = "ros2"))]
 pub(super) fn log_level(_: Option<&[String]>) -> Option<LevelFilter> {
     None
 }
 
-/// What was asked of ROS 2.
+/// The requested ROS 2 settings.
 #[derive(Debug)]
 pub(super) struct Asked {
     #[cfg(feature = "ros2")]
@@ -86,7 +87,7 @@ pub(super) struct Asked {
 
 #[cfg(feature = "ros2")]
 impl Asked {
-    /// Reads flags, ROS arguments with their files, and the environment.
+    /// Reads the flags, the ROS arguments with their files, and the environment.
     pub(super) fn read(args: &RunArgs, ros_words: Option<&[String]>) -> Result<Self> {
         if !args.ros2 && ros_words.is_none() {
             return match args.ros_domain_id {
@@ -105,7 +106,7 @@ impl Asked {
         })
     }
 
-    /// A scene with sources on topics needs the node.
+    /// Refuses a scene with sources on topics if there is no node.
     pub(super) fn check(&self, scene: &Scene) -> Result<()> {
         match scene.sources.iter().find(|source| source.ros2.is_some()) {
             Some(source) if self.node.is_none() => Err(needs_node(&source.name, "add --ros2")),
@@ -113,7 +114,7 @@ impl Asked {
         }
     }
 
-    /// Opens the node.
+    /// Opens the node, if requested.
     pub(super) fn open(
         self,
         scene: &Scene,
@@ -130,7 +131,7 @@ impl Asked {
                 args: args.clone(),
                 network,
                 boot_id,
-                // Each node counts its frames anew.
+                // Each node counts its frames from the start, so it needs its own session.
                 session: crate::transport::client::random_u64()?,
             };
             let waker = crate::transport::iceoryx::Waker::new(&place)?;
@@ -142,7 +143,7 @@ impl Asked {
 
 #[cfg(not(feature = "ros2"))]
 impl Asked {
-    /// Refuses what this build does not have.
+    /// Refuses the flags of ROS 2, which this build does not have.
     pub(super) fn read(args: &RunArgs, ros_words: Option<&[String]>) -> Result<Self> {
         if args.ros2 || args.ros_domain_id.is_some() || ros_words.is_some() {
             return Err(Error::Usage(
@@ -153,7 +154,7 @@ impl Asked {
         Ok(Self {})
     }
 
-    /// A scene with sources on topics needs the node.
+    /// Refuses a scene with sources on topics: this build has no node.
     pub(super) fn check(&self, scene: &Scene) -> Result<()> {
         match scene.sources.iter().find(|source| source.ros2.is_some()) {
             Some(source) => Err(needs_node(
@@ -164,13 +165,13 @@ impl Asked {
         }
     }
 
-    /// There is none.
+    /// Always `None`: this build has no node.
     pub(super) fn open(self, _: &Scene, _: &Shapes, _: &Place, _: u64) -> Result<Option<Node>> {
         Ok(None)
     }
 }
 
-/// What the node needs to know of a scene.
+/// The parts of a scene that the node needs.
 #[cfg(feature = "ros2")]
 fn cast(scene: &Scene, shapes: &Shapes) -> RosScene {
     let source = |spec: &crate::scene::SourceSpec| RosSourceSpec {
@@ -195,13 +196,13 @@ fn needs_node(source: &str, mend: &str) -> Error {
     ))
 }
 
-/// The node as a door.
+/// The node as a `Door`.
 #[cfg(feature = "ros2")]
 pub(super) fn door(node: &mut Option<Node>) -> Option<&mut dyn Door> {
     node.as_mut().map(|node| node as &mut dyn Door)
 }
 
-/// There is none.
+/// Always `None`: this build has no node.
 #[cfg(not(feature = "ros2"))]
 pub(super) fn door(_node: &mut Option<Node>) -> Option<&mut dyn Door> {
     None

@@ -23,15 +23,15 @@ use super::values::Limit;
 
 /// Exit code when the watchdog ends the process.
 const EXIT_WATCHDOG: i32 = 5;
-/// How long the watchdog's last line may take, nanoseconds: that of a machine that thrashes takes seconds.
+/// Longest time for the watchdog's last line, nanoseconds: on a machine that thrashes a line takes seconds.
 const LAST_LINE_NS: u64 = 5_000_000_000;
-/// The watchdog's time where none is given, nanoseconds; a longer heartbeat makes it longer.
+/// Default time of the watchdog, nanoseconds; a long heartbeat makes it longer.
 const WATCHDOG_NS: u64 = 10_000_000_000;
-/// Beyond a heartbeat, after which a long tick shows progress; an idle daemon does so each 100 ms, and a busy machine
-/// may keep it waiting for its turn.
+/// Least time of the watchdog beyond a heartbeat, nanoseconds. A long tick shows progress each heartbeat, an idle
+/// daemon each 100 ms, and a busy machine may delay either.
 const WATCHDOG_BEYOND_NS: u64 = 1_000_000_000;
 
-/// Runs the daemon until a signal, or for the ticks asked for.
+/// Runs the daemon until a signal, or for the requested number of ticks.
 pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBool) -> Result<bool> {
     let place = Place::new(&args.which.instance)?;
     let asked = ros::Asked::read(args, ros_words)?;
@@ -96,19 +96,20 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
         counted(sources, "source", "sources")
     );
     daemon.run(stop, args.ticks)?;
-    // That it failed was told when it did; the daemon has done its work.
+    // A failed recording was reported when it failed; it is no error here, since the daemon has done its work.
     let _told_already = daemon.end_record(watchdog);
     let ticks = counted(daemon.engine().ticks(), "tick", "ticks");
     tracing::info!("ended after {ticks}");
     Ok(true)
 }
 
-/// The door, and who cleans up dead clients beside the tick, never in it; `None`: a signal came before they were there.
+/// The server, and the thread that cleans up dead clients outside the tick; `None`: a signal came before they were
+/// ready.
 fn open(options: ServerOptions, stop: &AtomicBool) -> Result<Option<(Server, Cleaner)>> {
     let place = options.place.clone();
     let opened = Server::open(options).and_then(|server| Ok((server, spawn_cleaner(&place)?)));
     match opened {
-        // What iceoryx2 waits for in a start is cut off by a signal, and told as a failure.
+        // A signal interrupts waits of iceoryx2 at its start, which it reports as a failure.
         Err(cut_off) if stop.load(Ordering::Relaxed) => {
             tracing::info!("ended by a signal before it ran: {}", cut_off.with_causes());
             Ok(None)
@@ -117,8 +118,8 @@ fn open(options: ServerOptions, stop: &AtomicBool) -> Result<Option<(Server, Cle
     }
 }
 
-/// Ends the process for its watchdog, with a line past the log, whose lock a thread may hold that gets no turn. Where
-/// nobody takes the line, which may be what the tick thread waits for, the process ends without it.
+/// Ends the process for its watchdog. The last line bypasses the log, since a stalled thread may hold its lock. If
+/// stderr blocks, which may be what stalls the tick thread, the process ends without the line.
 fn give_up() {
     let wait = || {
         let start_ns = SystemClock.monotonic_ns();
@@ -135,7 +136,7 @@ fn give_up() {
     std::process::exit(EXIT_WATCHDOG);
 }
 
-/// How long a tick may show no progress. Less than a daemon may well stand still would end one that is healthy.
+/// Longest time without progress in a tick. A value that would end a healthy daemon is refused.
 fn watchdog(args: &RunArgs, scene: &Scene) -> Result<Limit> {
     let least_ns = scene.config.heartbeat_ns.saturating_add(WATCHDOG_BEYOND_NS);
     match args.watchdog {
@@ -150,7 +151,7 @@ fn watchdog(args: &RunArgs, scene: &Scene) -> Result<Limit> {
     }
 }
 
-/// Flags override the scene.
+/// Applies the flags, which override the scene.
 fn apply(args: &RunArgs, scene: &mut Scene) -> Result<()> {
     let limit = |limit| match limit {
         Limit::None => None,

@@ -1,4 +1,4 @@
-//! The screen of `sweepd monitor`: redrawn in place on a terminal, at most ten times a second; plain text elsewhere.
+//! The screen of `sweepd monitor`: redrawn in place on a terminal, at most ten times per second; plain text elsewhere.
 
 mod keys;
 mod lines;
@@ -23,16 +23,16 @@ use keys::Keys;
 use lines::{BOLD, GREEN, Ink, RED, YELLOW, flow};
 use pairs::{NAME_WIDTH, PairTable};
 
-/// Time between two drawings, nanoseconds: faster cannot be read, and would cost the daemon's machine a core.
+/// Least time between two drawings, nanoseconds: faster cannot be read, and would cost the daemon's machine a core.
 const REDRAW_NS: u64 = 100_000_000;
-/// Time between two lines that say silence, where nothing can be drawn in place, nanoseconds.
+/// Least time between two reports of silence if nothing is drawn in place, nanoseconds.
 const RESAY_NS: u64 = 1_000_000_000;
-/// Unknown bodies listed, at most; and lines of pairs that they leave on the terminal.
+/// Most unknown bodies listed; and the lines that they leave for pairs on the terminal.
 const UNKNOWN_SHOWN: usize = 5;
 const PAIRS_KEPT: usize = 3;
-/// Columns of the bar of the budget: where there is room, and where there is not.
+/// Width of the budget's bar, columns: wide and narrow.
 const BAR_WIDTHS: [usize; 2] = [20, 8];
-/// Columns from which on there is room for all that stands above the pairs.
+/// Least columns for the wide layout of the part above the pairs.
 const ROOMY: usize = 100;
 
 /// Draws ticks.
@@ -41,16 +41,16 @@ pub(super) struct Screen {
     pairs: usize,
     in_place: bool,
     ink: Ink,
-    /// Columns of a line; there is no end where nothing is drawn in place.
+    /// Columns of a line; unlimited if nothing is drawn in place.
     width: usize,
     drawn_ns: Option<u64>,
-    /// Tick number and moment of the last drawing, for the rate of ticks.
+    /// Number of the last tick drawn, for the rate of ticks; 0: none since a restart.
     drawn_tick: u64,
     restarts: u64,
-    /// From [`Screen::stop`] on; what of them is read, from [`Screen::open`] on.
+    /// Set by [`Screen::stop`]; read after [`Screen::open`].
     keys: Option<Keys>,
     are_keys_read: bool,
-    /// What stood below the first line, shown on through a silence.
+    /// The text below the head, which stays on the screen during a silence.
     below: String,
 }
 
@@ -73,14 +73,15 @@ impl Screen {
         }
     }
 
-    /// The flag that a signal raises which asks for an end; a second one ends the process, the terminal as it was.
+    /// The flag that the first SIGINT, SIGTERM or SIGHUP raises; a second one restores the terminal and ends the
+    /// process.
     pub(super) fn stop(&mut self) -> Result<Arc<AtomicBool>> {
         let (keys, stop) = Keys::watch()?;
         self.keys = Some(keys);
         Ok(stop)
     }
 
-    /// From now on `q` is read, where this is a terminal.
+    /// Starts to read `q`, if this is a terminal.
     pub(super) fn open(&mut self) {
         self.are_keys_read = self.in_place && self.keys.as_ref().is_some_and(Keys::open);
     }
@@ -90,7 +91,7 @@ impl Screen {
         self.are_keys_read && self.keys.as_ref().is_some_and(Keys::is_end_typed)
     }
 
-    /// Notes that the daemon restarted.
+    /// Counts a restart of the daemon.
     pub(super) fn note_restart(&mut self) {
         self.restarts += 1;
         self.drawn_tick = 0;
@@ -117,7 +118,7 @@ impl Screen {
         self.draw(&head, true, now_ns, out)
     }
 
-    /// Says that nothing comes any more, above what came last.
+    /// Reports silence, above the last drawing.
     pub(super) fn show_silence(&mut self, silent_ns: u64, out: &mut Out) -> Result<()> {
         let now_ns = SystemClock.monotonic_ns();
         let pause_ns = if self.in_place { REDRAW_NS } else { RESAY_NS };
@@ -148,8 +149,8 @@ impl Screen {
             .is_some_and(|drawn_ns| now_ns.saturating_sub(drawn_ns) < pause_ns)
     }
 
-    /// Takes the width that the terminal has now. Its last column stays free: what clears a line behind its text would
-    /// clear it.
+    /// Reads the current width of the terminal. The last column stays free: the code that clears the rest of a line
+    /// would clear it.
     fn measure(&mut self) {
         self.width = match stdout_size() {
             Some((_, columns)) if self.in_place => columns.saturating_sub(1),
@@ -161,8 +162,8 @@ impl Screen {
         self.drawn_ns = Some(now_ns);
         let below = if whole { self.below.as_str() } else { "" };
         if self.in_place {
-            // Home, long lines cut by the terminal, each line cleared behind its text, the rest cleared: no flicker,
-            // and nothing scrolls.
+            // Cursor home; the terminal cuts long lines; each line clears its rest, and the rest of the screen is
+            // cleared: no flicker and no scrolling.
             let most =
                 stdout_size().map_or(usize::MAX, |(lines, _)| lines.saturating_sub(1).max(1));
             out.text("\x1b[?7l\x1b[H")?;
@@ -229,7 +230,7 @@ impl Screen {
         }
         parts[0].insert_str(0, "reasons    ");
         flow(text, &parts, " ", self.width);
-        // One below the other where there is room for that.
+        // Aligned in columns if there is room.
         let roomy = self.width >= ROOMY;
         let pad = |width: usize| if roomy { width } else { 0 };
         let gap = if roomy { " " } else { "  " };
@@ -286,7 +287,7 @@ impl Screen {
         flow(text, &parts, "   ", self.width);
     }
 
-    /// How much of the budget is used, as a bar where there is one.
+    /// The elapsed time and the time budget, with a bar if there is a budget.
     fn budget(&self, tick: &TickRow, width: usize) -> String {
         let elapsed = time(tick.elapsed_ns);
         if tick.budget_ns == u64::MAX {
@@ -326,7 +327,7 @@ impl Screen {
             return;
         }
         text.push('\n');
-        // The worst pairs have room below, with their heads and what stands between.
+        // Leaves room for the worst pairs, with their heads and the blank lines between.
         let room = self.room(head_lines + text.lines().count() + 3);
         let shown = room.saturating_sub(PAIRS_KEPT).clamp(1, UNKNOWN_SHOWN);
         for (body, word) in unknown.iter().take(shown) {
@@ -356,7 +357,8 @@ impl Screen {
         }
     }
 
-    /// Rows that fit below so many lines, with a line that says how many did not, and the last, which stays free.
+    /// Rows that fit below `above` lines, with one line for the number of those left out, and the last line, which
+    /// stays free.
     fn room(&self, above: usize) -> usize {
         match stdout_size() {
             Some((lines, _)) if self.in_place => lines.saturating_sub(above + 2),
@@ -365,24 +367,24 @@ impl Screen {
     }
 }
 
-/// Whether stdout wants colours.
+/// Whether stdout gets colours.
 fn coloured_stdout() -> bool {
     drawn_stdout() && colours_wanted()
 }
 
-/// Whether stdout is a screen that can be drawn on in place.
+/// Whether stdout is a terminal that can be drawn on in place.
 fn drawn_stdout() -> bool {
     std::io::stdout().is_terminal() && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
 }
 
-/// Lines and columns of the terminal behind stdout.
+/// Lines and columns of the terminal on stdout.
 fn stdout_size() -> Option<(usize, usize)> {
     let size = rustix::termios::tcgetwinsize(std::io::stdout()).ok()?;
     let size = [size.ws_row, size.ws_col].map(usize::from);
     (size[0] > 0 && size[1] > 0).then_some((size[0], size[1]))
 }
 
-/// The word of a body's status, when its place is not known.
+/// The word of a body's status if its pose is unknown.
 fn unknown_word(body: &BodyRow) -> Option<&'static str> {
     match BodyStatus::from_code(body.status) {
         Some(BodyStatus::Known | BodyStatus::Disabled) | None => None,

@@ -1,4 +1,4 @@
-//! The signals that ask a command to end: the first raises a flag, one that comes later ends the process at once.
+//! Signals that end a command: the first raises a flag, a later one ends the process at once.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -9,17 +9,16 @@ use signal_hook::iterator::Signals;
 use crate::error::{Error, Result};
 use crate::time::{Clock as _, SystemClock};
 
-/// What a process ends with that is asked a second time.
+/// Exit code of a process that is signalled a second time.
 pub(super) const EXIT_SIGNALS: i32 = 4;
-/// What comes so soon after the first signal does not ask again, nanoseconds: `timeout` sends its own to the process
-/// and to the group, and a terminal's Ctrl-C reaches also a process to which a script passes it on.
+/// A signal within this time after the first does not count as a second one, nanoseconds: `timeout` signals both the
+/// process and its group, and a terminal's Ctrl-C also reaches a process to which a script forwards it.
 const ECHO_NS: u64 = 200_000_000;
 
-/// A flag that SIGINT, SIGTERM and a terminal's end raise; one that comes [`ECHO_NS`] later, or more, ends the process
-/// at once.
+/// A flag that SIGINT, SIGTERM and SIGHUP raise. A signal [`ECHO_NS`] or more after the first ends the process at once.
 ///
 /// # Errors
-/// `Error::Io` when signals cannot be listened for.
+/// `Error::Io` if signals cannot be watched.
 pub(super) fn stop() -> Result<Arc<AtomicBool>> {
     let stop = stop_at_first()?;
     let mut signals = Signals::new(asking()).map_err(failed)?;
@@ -36,29 +35,30 @@ pub(super) fn stop() -> Result<Arc<AtomicBool>> {
     Ok(stop)
 }
 
-/// A flag that SIGINT, SIGTERM and a terminal's end raise; a second signal is the caller's.
+/// A flag that SIGINT, SIGTERM and SIGHUP raise; the caller handles a second signal.
 ///
 /// # Errors
-/// `Error::Io` when signals cannot be listened for.
+/// `Error::Io` if signals cannot be watched.
 pub(super) fn stop_at_first() -> Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in asking() {
         signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(failed)?;
     }
-    // Beyond the largest file that is allowed a write fails then, and says so, in place of ending the process.
+    // With a handler for SIGXFSZ, a write beyond the limit of the file size fails with an error instead of ending the
+    // process.
     let too_large = rustix::process::Signal::XFSZ.as_raw();
     signal_hook::flag::register(too_large, Arc::default()).map_err(failed)?;
     Ok(stop)
 }
 
-/// The signals that ask for an end. SIGHUP, by which a terminal says that it closes, is none under `nohup`.
+/// The signals that ask for an end. SIGHUP, which a closing terminal sends, is left out under `nohup`.
 pub(super) fn asking() -> impl Iterator<Item = i32> {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let hup = (!is_ignored(&status, SIGHUP)).then_some(SIGHUP);
     [SIGINT, SIGTERM].into_iter().chain(hup)
 }
 
-/// Whether who started a process had a signal ignored, by its `/proc/PID/status`.
+/// Whether a process was started with a signal ignored, by its `/proc/PID/status`.
 fn is_ignored(status: &str, signal: i32) -> bool {
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
@@ -69,14 +69,14 @@ fn failed(e: std::io::Error) -> Error {
     Error::io("cannot listen for signals", e)
 }
 
-/// Since when a process is asked to end.
+/// Time of the first signal that asks for an end.
 #[derive(Debug, Default)]
 pub(super) struct Asked {
     first_ns: Option<u64>,
 }
 
 impl Asked {
-    /// Takes note of a signal; whether it asks once more.
+    /// Notes a signal; returns whether it is a second request.
     pub(super) fn again(&mut self, now_ns: u64) -> bool {
         let first_ns = *self.first_ns.get_or_insert(now_ns);
         now_ns.saturating_sub(first_ns) >= ECHO_NS

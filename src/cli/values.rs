@@ -1,6 +1,6 @@
-//! The values of flags, read from text. In: what the user wrote. Out: the value, or what to write instead.
+//! Parsers of flag values. In: the user's text. Out: the value, or what to write instead.
 
-/// A limit given by hand.
+/// A limit given by a flag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Limit {
     /// No limit.
@@ -26,17 +26,17 @@ pub(super) fn units(text: &str) -> Result<Limit, String> {
         .map_err(|_| "write a whole number of work units, or `none`".to_owned())
 }
 
-/// A whole number from 1 on.
+/// Parses a whole number, at least 1.
 pub(super) fn from_1(text: &str) -> Result<u64, String> {
     from(text, 1)
 }
 
-/// A whole number from 0 on.
+/// Parses a whole number, at least 0.
 pub(super) fn from_0(text: &str) -> Result<u64, String> {
     from(text, 0)
 }
 
-/// How many of something that is in memory.
+/// Parses a number of objects in memory.
 pub(super) fn count(text: &str) -> Result<usize, String> {
     from(text, 0).map(|n| usize::try_from(n).unwrap_or(usize::MAX))
 }
@@ -46,13 +46,13 @@ fn from(text: &str, least: u64) -> Result<u64, String> {
     number.ok_or_else(|| format!("write a whole number from {least} on"))
 }
 
-/// Ticks of a report at each of its budgets.
+/// Parses the number of ticks of a report at each of its budgets, 1 to 1,000,000.
 pub(super) fn ticks_of_report(text: &str) -> Result<u64, String> {
     let number = from_1(text).ok().filter(|number| *number <= 1_000_000);
     number.ok_or_else(|| "write a whole number from 1 to 1000000".to_owned())
 }
 
-/// A number and the letters behind it; those of an exponent are its own.
+/// Splits off the letters after a number; the letter of an exponent belongs to the number.
 pub(super) fn number_and_unit(text: &str) -> Option<(f64, &str)> {
     let split = text
         .rfind(|c: char| !c.is_ascii_alphabetic())
@@ -61,7 +61,7 @@ pub(super) fn number_and_unit(text: &str) -> Option<(f64, &str)> {
     Some((number.trim().parse().ok()?, unit))
 }
 
-/// Nanoseconds of `2ms`, `1.5s`, `1e-3s`, `500us`, `100ns`, `0`.
+/// Parses a time into nanoseconds: `2ms`, `1.5s`, `1e-3s`, `500us`, `100ns`, `0`.
 pub(super) fn nanoseconds(text: &str) -> Result<u64, String> {
     let wanted = || {
         format!(
@@ -94,7 +94,7 @@ pub(super) fn nanoseconds(text: &str) -> Result<u64, String> {
     Ok(ns.round() as u64)
 }
 
-/// As [`nanoseconds`], and not 0.
+/// As [`nanoseconds`], but refuses 0.
 pub(super) fn some_time(text: &str) -> Result<u64, String> {
     match nanoseconds(text)? {
         0 => Err(format!("`{text}`: write a time above 0, such as 10s")),
@@ -102,7 +102,7 @@ pub(super) fn some_time(text: &str) -> Result<u64, String> {
     }
 }
 
-/// Nanoseconds of `7ms..15ms`, or of one time for both ends.
+/// Parses `7ms..15ms`, or one time for both ends, into nanoseconds.
 pub(super) fn span(text: &str) -> Result<(u64, u64), String> {
     let (least, most) = text.split_once("..").unwrap_or((text, text));
     let (least, most) = (nanoseconds(least)?, nanoseconds(most)?);

@@ -1,17 +1,17 @@
-//! Which rows are shown where not all are: the worst first. In: rows by ids. Out: those to show, in order.
+//! Selects the rows to show if not all are shown: the worst first. In: rows by ids. Out: the rows to show, in order.
 
 use std::cmp::Ordering;
 
 use crate::wire::{ContactRow, Event, PairRow, Verdict, pair_flags};
 
-/// Pairs with an event, then by verdict or what happened on the way, then the deepest.
+/// Pairs with an event first, then by verdict or result of the sweep, then the deepest first.
 pub(super) fn pairs(rows: &[PairRow], most: usize) -> Vec<&PairRow> {
     worst(rows, most, |x, y| {
         (class(y).cmp(&class(x))).then(x.gap_min_m.total_cmp(&y.gap_min_m))
     })
 }
 
-/// The deepest contacts.
+/// The deepest contacts first.
 pub(super) fn contacts(rows: &[ContactRow], most: usize) -> Vec<&ContactRow> {
     worst(rows, most, |x, y| x.gap_m.total_cmp(&y.gap_m))
 }

@@ -1,4 +1,4 @@
-//! The files of iceoryx2 and the locks: whose they are, what rights there are, what dead processes left.
+//! Checks the files of iceoryx2 and the locks: owners, access rights, and leftovers of dead processes.
 
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
@@ -15,10 +15,10 @@ use super::{Finding, bytes};
 
 /// Directories of iceoryx2 under its root.
 const FOLDERS: [&str; 2] = ["nodes", "services"];
-/// Owners of nodes that are named in a line.
+/// Most owners of nodes, and most locks, named in one line.
 const NAMED: usize = 3;
 
-/// * `instance` - the one whose leftovers are cleaned; `None`: all.
+/// * `instance` - the instance whose leftovers are cleaned and whose lock is reported; `None`: all.
 pub(super) fn look(place: &Place, instance: Option<&str>, clean: bool) -> Vec<Finding> {
     let mut found = rights(&place.root());
     if found.iter().any(|f| f.level == super::Level::Wrong) {
@@ -38,7 +38,7 @@ pub(super) fn look(place: &Place, instance: Option<&str>, clean: bool) -> Vec<Fi
     found
 }
 
-/// Rights on the root and what is under it.
+/// Checks the access rights on the root and on the directories under it.
 fn rights(root: &Path) -> Vec<Finding> {
     let check = "rights";
     let meta = match std::fs::symlink_metadata(root) {
@@ -159,7 +159,7 @@ fn cleaned(done: &Cleaned) -> Vec<Finding> {
     found
 }
 
-/// What to do about what is left.
+/// The remedy for leftovers.
 fn mend(clean: bool, instance: Option<&str>) -> &'static str {
     match (clean, instance) {
         (false, _) => {
@@ -170,7 +170,7 @@ fn mend(clean: bool, instance: Option<&str>) -> &'static str {
     }
 }
 
-/// * `instance` - the one that is asked about; `None`: all.
+/// * `instance` - the instance whose lock is reported; `None`: all.
 fn judge(left: &Leftovers, instance: Option<&str>, mend: &str) -> Vec<Finding> {
     let check = "leftovers";
     let mut found = Vec::new();
@@ -179,7 +179,7 @@ fn judge(left: &Leftovers, instance: Option<&str>, mend: &str) -> Vec<Finding> {
     if !dead.is_empty() {
         found.push(Finding::warning(check, nodes(&dead), mend));
     }
-    // iceoryx2 does not clean them, and nobody needs it to.
+    // iceoryx2 does not remove these entries, and they do no harm.
     if !unknown.is_empty() {
         let what = format!(
             "{} that processes left which ended while they came or went: nothing is theirs any more",
@@ -208,7 +208,7 @@ fn judge(left: &Leftovers, instance: Option<&str>, mend: &str) -> Vec<Finding> {
     }
     found.extend(left.alive.iter().filter_map(zombie));
     let unmapped = &left.unmapped;
-    // Files of dead nodes are told with their nodes.
+    // Files of dead nodes are reported with their nodes.
     if let (true, Some(example)) = (dead.is_empty(), &unmapped.example) {
         found.push(Finding::warning(
             check,
@@ -232,7 +232,7 @@ fn judge(left: &Leftovers, instance: Option<&str>, mend: &str) -> Vec<Finding> {
     found
 }
 
-/// A process that has ended and that its parent has not asked for counts as alive.
+/// A warning if the node's process is a zombie: it counts as alive until its parent waits for it.
 fn zombie(node: &NodeOwner) -> Option<Finding> {
     let parent = unreaped_by(node)?;
     Some(Finding::warning(
@@ -255,7 +255,7 @@ fn nodes(owners: &[NodeOwner]) -> String {
     format!("{count} ({}{more})", named.join("; "))
 }
 
-/// What is told of locks that nobody holds; `None`: there is none.
+/// The text about locks that no process holds; `None`: there are none.
 fn locks(instances: &[&str]) -> Option<String> {
     let named: Vec<String> = (instances.iter().take(NAMED))
         .map(|name| format!("`{name}`"))

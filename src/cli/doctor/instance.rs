@@ -1,4 +1,5 @@
-//! An instance: is its name held by a living daemon, does it speak the same, does it tick, do its sources send.
+//! Checks an instance: whether a living daemon of the same versions holds its name and ticks, and whether its sources
+//! send.
 
 use crate::cli::figures::time;
 use crate::error::{Error, Result};
@@ -13,8 +14,8 @@ use super::Finding;
 use super::sources::sources;
 
 const CHECK: &str = "instance";
-/// How long a daemon has to say hello, and then to tick, nanoseconds: many heartbeats, which are 100 ms unless the
-/// scene says otherwise.
+/// Time limit for a daemon's first answer, and again for its tick, nanoseconds. It spans many heartbeats
+/// (100 ms unless the scene sets them).
 const WAIT_NS: u64 = 2_000_000_000;
 
 pub(super) fn look(place: &Place, info: &InstanceInfo) -> Vec<Finding> {
@@ -45,7 +46,7 @@ fn not_held(info: &InstanceInfo) -> Finding {
     }
 }
 
-/// Somebody has the name: whether that is a daemon that answers.
+/// Checks whether the holder of the name is a daemon that answers.
 fn held(place: &Place, lock: &Lock, holder: &Holder) -> Vec<Finding> {
     let who = format!(
         "`{}` is process {}, sweepd {}",
@@ -108,8 +109,8 @@ fn held(place: &Place, lock: &Lock, holder: &Holder) -> Vec<Finding> {
     found
 }
 
-/// Waits for a tick that has ended: one that is under way tells no sources. [`Heard::Tick`] of such a one alone: the
-/// time was up before its end.
+/// Waits for a complete tick: a tick under way has no source rows. Returns [`Heard::Tick`] with a tick under way only
+/// if the time is up.
 fn ended_tick(client: &mut Client, timeout_ns: u64) -> Result<Heard> {
     let until_ns = SystemClock.monotonic_ns().saturating_add(timeout_ns);
     loop {
@@ -124,7 +125,7 @@ fn ended_tick(client: &mut Client, timeout_ns: u64) -> Result<Heard> {
     }
 }
 
-/// What the newest tick says of the daemon and its sources.
+/// The findings from the newest tick about the daemon and its sources.
 fn ticks(who: &str, instance: &str, view: &View) -> Vec<Finding> {
     let tick = view.tick();
     let number = tick.header.tick;
@@ -147,7 +148,7 @@ fn ticks(who: &str, instance: &str, view: &View) -> Vec<Finding> {
     found
 }
 
-/// What its holder wrote into the lock is true of daemons of any version.
+/// Compares the versions that the holder wrote into the lock, which daemons of any version write alike.
 fn version(who: &str, holder: &Holder) -> Option<Finding> {
     let same = holder.wire_version == WIRE_VERSION && holder.iceoryx2_version == ICEORYX2_VERSION;
     (!same).then(|| {
@@ -164,7 +165,7 @@ fn version(who: &str, holder: &Holder) -> Option<Finding> {
     })
 }
 
-/// Why who holds the name does not answer.
+/// Why the holder of the name does not answer.
 fn silent(who: &str, place: &Place, lock: &Lock, holder: &Holder, why: &Error) -> Finding {
     let pid = holder.pid;
     let (what, mend) = match process(pid) {
@@ -204,7 +205,8 @@ fn silent(who: &str, place: &Place, lock: &Lock, holder: &Holder, why: &Error) -
     Finding::wrong(CHECK, what, mend)
 }
 
-/// It has no files left for clients that come: it serves those that it has, and is not to be ended for that.
+/// The finding for a daemon without file descriptors for new clients. It still serves its clients, so the remedy is not
+/// to end it.
 fn crowded(who: &str, files: OpenFiles) -> Finding {
     Finding::wrong(
         CHECK,
@@ -218,7 +220,7 @@ fn crowded(who: &str, files: OpenFiles) -> Finding {
     )
 }
 
-/// Clocks of another namespace may be shifted: ages are then off by as much.
+/// Warns if the daemon is in another time namespace: its clocks may be offset, and ages are wrong by that offset.
 fn namespace(who: &str, holder: &Holder) -> Option<Finding> {
     (shares(holder.pid, "time") == Some(false)).then(|| {
         Finding::warning(

@@ -1,4 +1,4 @@
-//! Limits of processes. Nothing of sweepd locks memory, so that limit is not looked at.
+//! Checks the resource limits of this process. sweepd locks no memory, so that limit is not checked.
 
 use rustix::process::{Resource, getrlimit};
 
@@ -6,17 +6,17 @@ use super::{Finding, bytes};
 use crate::limits::{ADDRESS_BYTES_LEAST, FILE_BYTES_LEAST, OPEN_FILES_LEAST};
 use crate::transport::open_files::OpenFiles;
 
-/// A limit, and what is needed of it.
+/// A resource limit, and the values that sweepd needs.
 struct Need {
     resource: Resource,
     what: &'static str,
     /// The flag of `ulimit`.
     flag: &'static str,
-    /// What that flag counts in, in units of the limit.
+    /// Unit of that flag's value, in units of the limit.
     unit: u64,
     /// Below this a daemon does not start.
     least: u64,
-    /// Below this it does not serve the clients that it could.
+    /// Below this a daemon serves fewer clients than it could.
     wished: u64,
     why: &'static str,
     show: fn(u64) -> String,
@@ -60,7 +60,7 @@ pub(super) fn look() -> Vec<Finding> {
     NEEDS.iter().map(|need| judge(need, limit(need))).collect()
 }
 
-/// What is said in place of all that needs files to be looked at; `None`: there are enough.
+/// The finding that replaces all checks that open files; `None`: there are enough file descriptors.
 pub(super) fn blind() -> Option<Finding> {
     let files = OpenFiles::own().filter(|files| !files.are_enough_for_a_client())?;
     Some(Finding::wrong(
@@ -70,7 +70,7 @@ pub(super) fn blind() -> Option<Finding> {
     ))
 }
 
-/// * `limit` - `None`: there is none.
+/// * `limit` - the soft limit; `None`: unlimited.
 fn judge(need: &Need, limit: Option<u64>) -> Finding {
     let check = "limits";
     let Some(limit) = limit else {

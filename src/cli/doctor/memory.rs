@@ -1,4 +1,4 @@
-//! Shared memory and clocks: is there room, may this user write, do ages count.
+//! Checks shared memory and clocks: free space, write access, and whether ages can be measured.
 
 use rustix::fs::{Access, AtFlags, CWD, accessat, statfs, statvfs};
 use rustix::io::Errno;
@@ -6,16 +6,16 @@ use rustix::time::{DynamicClockId, clock_gettime_dynamic};
 
 use super::{Finding, bytes};
 
-/// Where iceoryx2 keeps shared memory.
+/// Directory of iceoryx2's shared memory.
 const SHARED: &str = "/dev/shm";
-/// What `statfs` says of a file system in memory (`TMPFS_MAGIC`).
+/// `statfs` type of a file system in memory (`TMPFS_MAGIC`).
 const TMPFS: i64 = 0x0102_1994;
-/// Free bytes below which frames of some thousand bodies do not fit: a process that writes where there is no memory
-/// left is killed (SIGBUS). Frames of 100,000 bodies take 14 MB a source; containers often have 64 MiB in all.
+/// Free bytes below which frames of some thousand bodies may not fit. A process that writes to shared memory when none
+/// is left is killed (SIGBUS). Frames of 100,000 bodies take 14 MB per source; containers often have 64 MiB in all.
 const FREE_SCARCE: u64 = 64 << 20;
-/// Free bytes below which a daemon and its clients hardly start: they take a third of a MiB each.
+/// Free bytes below which a daemon and its clients hardly start: each takes a third of a MiB.
 const FREE_NONE: u64 = 4 << 20;
-/// Free entries below which a daemon may not start: it has some 40 files, a client some 6.
+/// Free inodes below which a daemon may not start: it has some 40 files, a client some 6.
 const ENTRIES_NONE: u64 = 100;
 
 pub(super) fn look() -> Vec<Finding> {
@@ -37,7 +37,7 @@ fn room() -> Vec<Finding> {
         }
     };
     let of = |blocks: u64| blocks.saturating_mul(stat.f_frsize);
-    // A file system without a limit of entries says 0 of both.
+    // A file system without an inode limit reports 0 inodes in total and 0 free.
     let entries = (stat.f_files > 0).then_some(stat.f_favail);
     let mut found = vec![judge(of(stat.f_bavail), of(stat.f_blocks), entries)];
     let may = Access::READ_OK | Access::WRITE_OK | Access::EXEC_OK;
@@ -54,7 +54,7 @@ fn room() -> Vec<Finding> {
     found
 }
 
-/// What is said where no file can be made.
+/// The finding if no file can be created in shared memory.
 fn shut(because: Errno) -> Finding {
     let mend = if because == Errno::ROFS {
         "it is mounted read-only: `mount -o remount,rw /dev/shm`, or start the container with a writable one"
@@ -68,7 +68,7 @@ fn shut(because: Errno) -> Finding {
     )
 }
 
-/// * `entries` - files that can still be made; `None`: no limit.
+/// * `entries` - free inodes; `None`: no limit.
 fn judge(free: u64, size: u64, entries: Option<u64>) -> Finding {
     let check = "shared memory";
     let what = format!("{} of {} are free in {SHARED}", bytes(free), bytes(size));
@@ -91,7 +91,7 @@ fn judge(free: u64, size: u64, entries: Option<u64>) -> Finding {
     }
 }
 
-/// The clock that ages count on.
+/// Checks `CLOCK_BOOTTIME`, which ages are measured on.
 fn boottime() -> Finding {
     let check = "clocks";
     let read = || clock_gettime_dynamic(DynamicClockId::Boottime).map(|at| (at.tv_sec, at.tv_nsec));

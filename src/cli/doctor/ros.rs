@@ -1,18 +1,18 @@
-//! What `sweepd run --ros2` needs of the machine: variables, loopback, receive buffers, ports.
+//! Checks the needs of `sweepd run --ros2`: environment variables, loopback interface, receive buffers, ports.
 
 use crate::transport::ros2::env::{Network, Range, unread};
 
 use super::Finding;
 
 const CHECK: &str = "ros2";
-/// Receive buffer that takes a burst of the largest messages, bytes (README, "Run it as a ROS 2 node").
+/// Receive buffer that holds a burst of the largest messages, bytes (README, "Run it as a ROS 2 node").
 const BUFFER: u64 = 4_194_304;
-/// Ports of DDS: of a domain they begin at 7400 + 250 a domain (DDSI-RTPS 2.5, section 9.6.2.4).
+/// The DDS ports of a domain begin at 7400 + 250 * domain (DDSI-RTPS 2.5, section 9.6.2.4).
 const PORTS_BASE: u32 = 7400;
 const PORTS_DOMAIN: u32 = 250;
-/// Ports that the first 50 nodes on a host use of them.
+/// Number of these ports that the first 50 nodes on a host use.
 const PORTS_USED: u32 = 112;
-/// Bit of an interface's flags in sysfs: it is up.
+/// Bit of an interface's flags in sysfs: the interface is up.
 const IFF_UP: u32 = 1;
 
 pub(super) fn look() -> Vec<Finding> {
@@ -64,7 +64,7 @@ fn variables(network: &Result<Network, String>) -> Finding {
     }
 }
 
-/// A domain whose ports the kernel gives to anybody's outgoing connections may find them taken.
+/// Warns if the kernel may give the domain's ports to outgoing connections of any program.
 fn ports(domain: u16, given: Option<&str>) -> Option<Finding> {
     let mut ends = given?.split_whitespace().map(str::parse::<u32>);
     let (first, last) = (ends.next()?.ok()?, ends.next()?.ok()?);
@@ -99,7 +99,7 @@ fn loopback(flags: Option<&str>) -> Finding {
     }
 }
 
-/// * `usual`, `most` - what a socket gets, and what it may ask for, bytes.
+/// * `usual`, `most` - default and maximum receive buffer of a socket, bytes.
 fn buffers(usual: Option<u64>, most: Option<u64>) -> Finding {
     let (Some(usual), Some(most)) = (usual, most) else {
         return Finding::warning(

@@ -1,4 +1,4 @@
-//! Sources as a tick of the daemon tells them: who sends, and what was refused.
+//! Findings about the sources in a daemon's tick: which of them send, and what was refused.
 
 use crate::cli::figures::time;
 use crate::cli::monitor::rejects;
@@ -6,7 +6,7 @@ use crate::wire::{SourceRow, TickRow, name_str};
 
 use super::Finding;
 
-/// Sources that send nothing, and what was refused of those that do.
+/// One finding per source, and a warning with all refusals since the daemon's start.
 pub(super) fn sources(instance: &str, tick: &TickRow) -> Vec<Finding> {
     let check = "sources";
     let mut found = Vec::new();

@@ -1,9 +1,9 @@
-//! A source with work of its own and a frame time to keep: what its work leaves of each frame is the daemon's.
+//! A source with its own work and a fixed frame time: the daemon gets the time that the work leaves of each frame.
 //!
-//! In: bodies, a client, how long the work takes. Out: when each frame's result was there, in a table.
+//! In: bodies, a client, the range of work times. Out: a table of the work, the time left and the time to the result.
 //!
-//! Source: RTR3 section 17.6.1: collision detection takes what time the frame has left, because a late hit spoils the
-//! perceived causality.
+//! Source: RTR3 section 17.6.1: collision detection gets the time that the frame has left, because a late hit spoils
+//! the perceived causality.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -16,26 +16,28 @@ use crate::time::{Clock, SystemClock};
 use crate::transport::client::{Client, FrameInfo, Rows, StepError};
 use crate::wire::Reason;
 
-/// Kept back of each frame for the way there and back, nanoseconds: what two wake-ups take at worst on a busy machine.
+/// Time kept back in each frame for the messages to and from the daemon, nanoseconds: two wake-ups on a busy machine at
+/// worst.
 const WAY_NS: u64 = 300_000;
 /// Longest wait for a result, nanoseconds.
 const WAIT_NS: u64 = 1_000_000_000;
 
-/// Times of frames, nanoseconds; each list in the order of frames.
+/// Times of frames, nanoseconds, each list in the order of frames; and counts of frames.
 #[derive(Debug, Default)]
 struct Times {
     work_ns: Vec<u64>,
-    /// Said to be left for the tick.
+    /// Time that the frame announced as left for the tick.
     left_ns: Vec<u64>,
-    /// From the frame's begin to its result.
+    /// Time from the start of the frame to its result.
     whole_ns: Vec<u64>,
     undecided: usize,
     lost: usize,
 }
 
-/// Sends frames in lockstep until stopped, or for the frames asked for; then says how well the frame time was kept.
+/// Sends frames in lockstep until stopped or until the requested number is sent; then prints how well the frame time
+/// was kept.
 ///
-/// * `work_ns` - shortest and longest time that the source works before it sends a frame.
+/// * `work_ns` - shortest and longest work of the source before it sends a frame.
 pub(super) fn keep(
     args: &FeedArgs,
     work_ns: (u64, u64),
@@ -60,14 +62,14 @@ pub(super) fn keep(
         let own_ns = work_ns.0 + random.bits() % (work_ns.1 - work_ns.0 + 1);
         let (time_s, stamp_ns) = moment(frame, args.course.rate);
         bodies.move_to(time_s);
-        // Work, not sleep: the daemon is to find a machine on which somebody works.
+        // Busy work instead of sleep, so that the daemon runs on a loaded machine.
         while clock.monotonic_ns() < begin_ns + own_ns {
             std::hint::spin_loop();
         }
         let left_ns = end_ns.saturating_sub(clock.monotonic_ns() + WAY_NS);
         let info = FrameInfo {
             stamp_ns,
-            // 0 would say nothing: then the tick takes what it wants.
+            // 0 would mean "not given": the frame would not limit the tick.
             time_left_ns: left_ns.max(1),
             ..FrameInfo::default()
         };
@@ -120,7 +122,7 @@ impl Times {
     }
 }
 
-/// Least, median, 99th of a hundred and greatest, milliseconds.
+/// Least, median, 99th percentile and greatest time, milliseconds.
 fn spread(times_ns: &mut [u64]) -> String {
     times_ns.sort_unstable();
     let at = |share: usize| {

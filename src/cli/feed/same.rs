@@ -1,7 +1,8 @@
-//! Whether the daemon runs the scene that is fed: frames say bodies by id, and an id of another scene is another
-//! body's.
+//! Checks that the daemon runs the scene that is fed: frames name bodies by id, and in another scene an id may belong
+//! to another body.
 //!
-//! In: the bodies that are sent, the names that the daemon tells. Out: whether frames may go, or how the scenes differ.
+//! In: the bodies that are sent, the names that the daemon publishes. Out: whether frames may be sent, or how the
+//! scenes differ.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -13,30 +14,30 @@ use crate::time::{Clock as _, SystemClock};
 use crate::transport::client::{Client, Heard, Message, Topics};
 use crate::wire::{NameRow, name_str};
 
-/// The bodies that are sent, and the daemon whose names they were held against.
+/// The bodies that are sent, and the boot of the daemon whose names were checked.
 pub(super) struct Same {
     /// Ids and names.
     bodies: Vec<(u64, String)>,
-    /// The boot of those names, for which ids stay with their names; 0: none yet.
+    /// Boot id of the checked names; 0: none yet. Within one boot an id keeps its name.
     boot_id: u64,
 }
 
-/// How a scene differs from ours: the first body of each kind, and how many.
+/// Differences between the daemon's scene and ours: the first of each kind, and the number of bodies.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Differs {
-    /// A body of ours that is not there.
+    /// A body of ours that the daemon does not have.
     missing: Option<String>,
-    /// An id that is another body's there: it, our name, the name there.
+    /// An id that belongs to another body in the daemon: the id, our name, the daemon's name.
     other: Option<(u64, String, String)>,
     count: usize,
 }
 
-/// How it went to meet the daemon.
+/// Outcome of `Same::meet`.
 #[derive(Debug, Default)]
 pub(super) struct Met {
-    /// It has started anew since it was last met.
+    /// Whether the daemon has restarted since the last call.
     pub(super) is_another: bool,
-    /// How long its names were waited for, nanoseconds.
+    /// Time waited for the daemon's names, nanoseconds.
     pub(super) waited_ns: u64,
 }
 
@@ -45,7 +46,7 @@ impl Same {
         Self { bodies, boot_id: 0 }
     }
 
-    /// Listens to names.
+    /// Subscribes to the names.
     pub(super) fn subscribe(client: &mut Client) -> Result<()> {
         client.subscribe(Topics {
             names: true,
@@ -53,10 +54,11 @@ impl Same {
         })
     }
 
-    /// Takes what has come, and waits for the names of a daemon that has not told them yet; `None`: stopped meanwhile.
+    /// Takes the pending messages, and waits for the names if the daemon has not published them yet; `None`: stopped
+    /// meanwhile.
     ///
     /// # Errors
-    /// `Error::Refused` where the daemon's scene is another; `Error::TimedOut` where no names come.
+    /// `Error::Refused` if the daemon runs another scene; `Error::TimedOut` if no names come within `args.wait`.
     pub(super) fn meet(
         &mut self,
         client: &mut Client,
@@ -64,7 +66,7 @@ impl Same {
         stop: &AtomicBool,
     ) -> Result<Option<Met>> {
         let (clock, mut met) = (SystemClock, Met::default());
-        // A frame for a daemon that is no more would be refused by the next one.
+        // A frame for a daemon that has ended would be refused by the next one.
         loop {
             match client.latest()? {
                 Heard::Silence => break,
@@ -91,12 +93,13 @@ impl Same {
         Ok(Some(met))
     }
 
-    /// Whether frames may go to who tells these names.
+    /// Whether frames may be sent to the daemon that published these names.
     fn holds(&mut self, names: Option<&Message<NameRow>>, args: &FeedArgs) -> Result<bool> {
         let Some(names) = names else {
             return Ok(false);
         };
-        // A body that an edit removes later is refused and told as that, and its id goes to no other.
+        // Checked once per boot: the daemon refuses frames of a body that an edit removed, and gives its id to no
+        // other.
         if self.boot_id != names.header.boot_id {
             let differs = self.differs(&names.rows);
             if differs.count > 0 {
@@ -107,7 +110,7 @@ impl Same {
         Ok(true)
     }
 
-    /// * `names` - by id.
+    /// * `names` - sorted by id.
     fn differs(&self, names: &[NameRow]) -> Differs {
         let mut differs = Differs::default();
         for (id, ours) in &self.bodies {
@@ -198,9 +201,9 @@ mod tests {
         let text = refused(&mut same, &names(7, fewer));
         assert!(text.contains("(the daemon has no \"hand\")"), "{text}");
         assert!(same.holds(Some(&names(7, &whole)), &args).unwrap());
-        // In that boot no id goes to another body, and one that an edit has removed moves no other.
+        // Within one boot no id moves to another body, so that a removed body's id moves no other body.
         assert!(same.holds(Some(&names(7, fewer)), &args).unwrap());
-        // The next daemon may have another scene.
+        // The next daemon may run another scene.
         let text = refused(&mut same, &names(8, &other));
         let words = "(id 3 is \"hand\" in the file and \"table\" in the daemon)";
         assert!(text.contains(words), "{text}");

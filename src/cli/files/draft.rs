@@ -1,4 +1,4 @@
-//! Files that are there whole or not at all. In: a path, and the bytes once they are known. Out: the file in its place.
+//! Files that are written completely or not at all. In: a path, and later the content. Out: the file at its path.
 
 use std::ffi::OsString;
 use std::fs::{File, TryLockError};
@@ -7,26 +7,29 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// A file to be written when all is done. It is opened before, so that nobody waits minutes for a refusal.
+/// A file that a command writes at its end. It is opened at the start, so that a refusal does not come after minutes of
+/// work.
 ///
-/// It is written beside its place and put there whole: one that is there stays until then, also where the disk fills.
+/// The content goes to a temporary file in the same folder, which is then renamed: an existing file stays until then,
+/// even if the disk fills up.
 pub(in crate::cli) struct Draft {
-    /// Its place, where links lead to.
+    /// Final path of the file, with links to an existing file resolved.
     path: PathBuf,
     file: File,
-    /// Where it is written meanwhile; `None`: in its place, which is no file of its own (`/dev/stdout`), or in a folder
-    /// in which nothing can be made.
+    /// Path of the temporary file; `None`: the content goes straight to `path`, because that is not a regular file
+    /// (`/dev/stdout`), or because no file can be created in its folder.
     beside: Option<PathBuf>,
 }
 
 impl Draft {
-    /// Opens it.
+    /// Opens the file.
     ///
-    /// * `over` - whether one that is there is written over.
-    /// * `what` - it is for, in words.
+    /// * `over` - whether an existing file is overwritten.
+    /// * `what` - purpose of the file, in words.
     ///
     /// # Errors
-    /// `Error::Refused` when it is there, `Error::Io` when it cannot be written, or another process is writing it.
+    /// `Error::Refused` if the file exists without `over`; `Error::Io` if it cannot be written, or if another process
+    /// is writing it.
     pub(in crate::cli) fn open(path: &Path, over: bool, what: &str) -> Result<Self> {
         if !over && path.symlink_metadata().is_ok() {
             return Err(super::is_there(path));
@@ -34,21 +37,21 @@ impl Draft {
         Self::try_open(path).map_err(|e| super::unopened(path, what, e))
     }
 
-    /// Writes it and puts it into its place.
+    /// Writes the content and moves the file to its final path.
     ///
     /// # Errors
-    /// `Error::Io` when it cannot be written.
+    /// `Error::Io` if it cannot be written.
     pub(in crate::cli) fn write(mut self, text: &str) -> Result<()> {
         self.try_write(text)
             .map_err(|e| Error::io(format!("cannot write {}", self.path.display()), e))
     }
 
-    /// Writes a file in one go, over one that is there.
+    /// Writes a file in one call; overwrites an existing one.
     pub(in crate::cli) fn put(path: &Path, text: &str) -> IoResult<()> {
         Self::try_open(path)?.try_write(text)
     }
 
-    /// Where it will be.
+    /// Final path of the file.
     pub(in crate::cli) fn path(&self) -> &Path {
         &self.path
     }
@@ -105,7 +108,7 @@ impl Draft {
 impl Drop for Draft {
     fn drop(&mut self) {
         if let Some(beside) = &self.beside {
-            // That it was not written is told by whoever ends for it.
+            // The caller reports why the file was not written.
             let _ = std::fs::remove_file(beside);
         }
     }
@@ -115,8 +118,8 @@ impl Drop for Draft {
 mod tests {
     use super::*;
 
-    /// A full disk, or a signal, left a page of 0 bytes, or a part of one; `feed --write-scene --force` lost the old
-    /// scene by it, and without --force the next try was refused.
+    /// A full disk or a signal left an empty or partial page. `feed --write-scene --force` lost the old scene this way,
+    /// and without --force the next try was refused.
     #[test]
     fn bug_a_file_that_is_not_written_is_taken_away_and_one_that_was_there_stays() {
         let folder = std::env::temp_dir().join(format!("sweepd_draft_{}", std::process::id()));
@@ -131,7 +134,7 @@ mod tests {
         assert_eq!(refused.exit_code(), 4);
         assert!(refused.to_string().contains("--force"), "{refused}");
         let mut draft = open(true).unwrap();
-        // As on a full disk: what is open for reading takes no bytes.
+        // As on a full disk: a file opened for reading takes no bytes.
         draft.file = File::open(&path).unwrap();
         assert!(draft.write("text").is_err());
         assert_eq!(
@@ -145,7 +148,7 @@ mod tests {
             (left(), std::fs::read_to_string(&path).unwrap()),
             (1, "new".into())
         );
-        // Another process that writes it, such as a recorder, goes on.
+        // Another process that is writing the file, such as a recorder, is not disturbed.
         let held = File::options().write(true).open(&path).unwrap();
         held.try_lock().unwrap();
         let busy = open(true).map(|_| ()).unwrap_err();

@@ -1,6 +1,6 @@
-//! Where what is heard goes: JSON lines, or the screen.
+//! Output of the monitor: JSON lines, or the screen.
 //!
-//! A build without the feature `tui` has no screen, and says so.
+//! A build without the feature `tui` has no screen and refuses it.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -14,9 +14,9 @@ use crate::cli::screen::Screen;
 use crate::error::Result;
 use crate::transport::client::{Restarted, View};
 
-/// Lines, or the screen.
+/// JSON lines, or the screen.
 pub(super) enum Face {
-    /// A line of JSON a tick.
+    /// One line of JSON per tick.
     Lines,
     /// Drawn in place on a terminal.
     #[cfg(feature = "tui")]
@@ -24,7 +24,7 @@ pub(super) enum Face {
 }
 
 impl Face {
-    /// What was asked for.
+    /// The requested output.
     #[cfg(feature = "tui")]
     #[allow(
         clippy::unnecessary_wraps,
@@ -38,7 +38,7 @@ impl Face {
         Ok(Self::Screen(screen))
     }
 
-    /// Refuses what this build does not have.
+    /// The requested output; refuses the screen, which this build does not have.
     #[cfg(not(feature = "tui"))]
     pub(super) fn of(args: &MonitorArgs) -> Result<Self> {
         use crate::error::Error;
@@ -52,7 +52,7 @@ impl Face {
         ))
     }
 
-    /// The flag that a signal raises which asks for an end.
+    /// The flag that SIGINT, SIGTERM and SIGHUP raise.
     pub(super) fn stop(&mut self) -> Result<Arc<AtomicBool>> {
         match self {
             Self::Lines => crate::cli::stop(),
@@ -61,7 +61,7 @@ impl Face {
         }
     }
 
-    /// From now on keys are for the screen.
+    /// Starts to read keys for the screen.
     pub(super) fn open(&mut self) {
         match self {
             Self::Lines => {}
@@ -70,7 +70,7 @@ impl Face {
         }
     }
 
-    /// Whether its end was typed.
+    /// Whether the key that ends the monitor was typed.
     pub(super) fn is_end_typed(&self) -> bool {
         match self {
             Self::Lines => false,
@@ -96,7 +96,7 @@ impl Face {
         }
     }
 
-    /// The daemon began anew.
+    /// Reports a restart of the daemon.
     pub(super) fn restart(&mut self, news: &Restarted, names: &Names, out: &mut Out) -> Result<()> {
         match self {
             Self::Lines => {
@@ -111,7 +111,7 @@ impl Face {
         }
     }
 
-    /// Nothing has been heard for so long. In lines silence is silence.
+    /// Reports that nothing was received for `silent_ns`. JSON lines do not report silence.
     #[cfg_attr(
         not(feature = "tui"),
         expect(unused_variables, reason = "lines do not say it")

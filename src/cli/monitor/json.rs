@@ -13,7 +13,7 @@ use crate::wire::{
     Verdict, name_str, pair_flags,
 };
 
-/// A tick and what came with it.
+/// A tick and the rows that came with it.
 pub(super) fn tick(view: &View, names: &Names, args: &MonitorArgs) -> Value {
     let tick = view.tick();
     let stages: serde_json::Map<_, _> = Stage::ALL
@@ -85,7 +85,7 @@ pub(super) fn tick(view: &View, names: &Names, args: &MonitorArgs) -> Value {
     line
 }
 
-/// How the broad phase worked.
+/// Mode and cause of the broad phase, and the number of bodies whose fat box it renewed.
 fn broad(tick: &TickRow) -> Value {
     json!({
         "mode": BroadMode::from_code(tick.broad_mode).map_or("?", BroadMode::word),
@@ -94,7 +94,7 @@ fn broad(tick: &TickRow) -> Value {
     })
 }
 
-/// A number; JSON has no infinity: an open end is null.
+/// A number; null if it is infinite, which JSON cannot express.
 fn metres(value: f64) -> Value {
     if value.is_finite() {
         json!(value)
@@ -147,14 +147,14 @@ fn contact(row: &ContactRow, names: &Names) -> Value {
     })
 }
 
-/// A daemon that began anew, and the ends of what it had told.
+/// A restart of the daemon, and the published pairs that ended by it.
 pub(super) fn restart(news: &Restarted, names: &Names) -> Value {
     let ends = news.ends.iter().map(|row| pair(row, names));
     let boots = [news.old_boot, news.new_boot].map(|boot| format!("{boot:016x}"));
     json!({ "restarted": { "boots": boots, "ends": ends.collect::<Vec<_>>() } })
 }
 
-/// A budget as JSON: null where there is none.
+/// A limit or an age as JSON; null if there is none.
 fn limit(value: u64) -> Value {
     if value == u64::MAX {
         Value::Null

@@ -12,7 +12,7 @@ use crate::cli::out::Out;
 use crate::error::Result;
 use crate::wire::{GapFound, Verdict};
 
-/// Asks, waits and tells.
+/// Asks the daemon, waits and prints the answer.
 pub(super) fn gap(
     a: &str,
     b: &str,

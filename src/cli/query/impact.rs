@@ -11,7 +11,7 @@ use crate::cli::out::Out;
 use crate::error::Result;
 use crate::wire::ImpactFound;
 
-/// Asks, waits and tells.
+/// Asks the daemon, waits and prints the answer.
 pub(super) fn impact(
     a: &str,
     b: &str,

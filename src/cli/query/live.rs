@@ -1,5 +1,5 @@
-//! Questions to a running daemon: asked, waited for, and why there is no answer. In: JSON. Out: the answer; and how its
-//! parts are told to people.
+//! Sends questions to a running daemon, waits for answers and explains why there is none. In: JSON. Out: the answer,
+//! and its parts as text for users.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,14 +18,14 @@ use crate::time::{Clock, SystemClock};
 use crate::transport::client::{Client, Topics};
 use crate::wire::{Answer, MessageHeader, UnknownBody, Verdict, name_str};
 
-/// Longest wait before a look at the stop flag, nanoseconds.
+/// Longest wait between two checks of the stop flag, nanoseconds.
 const LOOK_NS: u64 = 100_000_000;
-/// How long to wait for the names of the scene, which only help to say what is wrong, nanoseconds.
+/// Longest wait for the names of the scene, which are only used in error messages, nanoseconds.
 const NAMES_WAIT_NS: u64 = 1_000_000_000;
 
-/// What the text of a fault may begin with: which question.
+/// Prefixes of error texts, which name the kind of question.
 const KINDS: [&str; 4] = ["gap: ", "touching: ", "ray: ", "impact: "];
-/// The flags that keys of questions are told by.
+/// Keys of questions, and the flags that messages name instead of them.
 const FLAGS: [(&str, &str); 11] = [
     ("position", "--at"),
     ("orientation", "--at"),
@@ -40,13 +40,14 @@ const FLAGS: [(&str, &str); 11] = [
     ("angular_b", "--angular-b"),
 ];
 
-/// What numbers of a key that ends so are in: a flag has units of its own.
+/// Units of keys with these endings. Messages name the unit of the key, since a flag has its own units.
 const UNITS: [(&str, &str); 2] = [("_m", "metres"), ("_s", "seconds")];
 
-/// Reads a question as the daemon will: what is wrong with it is the user's, and needs no daemon to be told.
+/// Parses a question as the daemon will. An error in it is the user's, and needs no daemon to be found.
 fn check(question: &Value) -> Result<()> {
     let of_shape = |why: &str| Error::Usage(format!("--shape: {}", bare(why)));
-    // What is wrong with a shape begins with the number that is, which other flags may have, too: it is read alone.
+    // An error in a shape begins with the name of its number, which other flags may have, too: the shape is parsed
+    // alone.
     if let Some(shape) = question["touching"].get("shape") {
         let alone = json!({ "touching": { "shape": shape } }).to_string();
         Request::parse(alone.as_bytes(), &[]).map_err(|why| of_shape(&why))?;
@@ -69,7 +70,7 @@ fn check(question: &Value) -> Result<()> {
         return Ok(());
     };
     for spec in question.shapes() {
-        // Its file is beside the daemon's scene.
+        // The mesh file is beside the daemon's scene file.
         let is_elsewhere = matches!(
             &spec.shape,
             ShapeSpec::Convex { file: Some(_), .. } | ShapeSpec::Trimesh { file: Some(_), .. }
@@ -81,16 +82,16 @@ fn check(question: &Value) -> Result<()> {
     Ok(())
 }
 
-/// What a fault says, without which question it is of.
+/// The text of an error without the prefix of its question.
 fn bare(why: &str) -> &str {
     let said = KINDS.iter().find_map(|kind| why.strip_prefix(kind));
     said.unwrap_or(why)
 }
 
-/// Asks and waits.
+/// Sends a question and waits for the answer.
 ///
-/// * `named` - the names in the question, to tell which is none.
-/// * `found` - what the answer says, where it is one.
+/// * `named` - the body names in the question, to find an unknown one.
+/// * `found` - takes the result out of the answer, if it has one.
 pub(super) fn ask<T>(
     question: &Value,
     named: &[&str],
@@ -133,7 +134,7 @@ pub(super) fn ask<T>(
     }
 }
 
-/// Whether a fault is of a mesh file that a shape, or one of a list, names.
+/// Whether an error is about a mesh file of a shape, or of one in a list of shapes.
 fn is_of_file(shape: &Value, why: &str) -> bool {
     match shape {
         Value::Array(shapes) => shapes.iter().any(|shape| is_of_file(shape, why)),
@@ -143,7 +144,7 @@ fn is_of_file(shape: &Value, why: &str) -> bool {
     }
 }
 
-/// Tells an answer, as one JSON object or as text.
+/// Prints an answer, as one JSON object or as text.
 pub(super) fn tell(
     (args, out): (&QueryArgs, &mut Out),
     as_json: impl FnOnce() -> Value,
@@ -162,7 +163,7 @@ fn stopped() -> Error {
     Error::TimedOut("ended by a signal before there was an answer".to_owned())
 }
 
-/// Why there is no gap to tell: a name that no body has is the user's, all else the daemon's word.
+/// The error if there is no result: an unknown or repeated name is the user's mistake, all else the daemon's refusal.
 fn refusal(client: &mut Client, asked: &[&str], why: Option<String>, stop: &AtomicBool) -> Error {
     let why = why.unwrap_or_else(|| "the daemon refuses, and does not say why".to_owned());
     let Some(names) = names(client, stop) else {
@@ -212,7 +213,7 @@ fn names(client: &mut Client, stop: &AtomicBool) -> Option<Vec<String>> {
     }
 }
 
-/// An answer as JSON for people: the tick's keys in place of its header.
+/// An answer as JSON for users: keys of the tick in place of its header.
 pub(super) fn told_json(mut answer: Value, header: &MessageHeader, warnings: &[String]) -> Value {
     if let Value::Object(keys) = &mut answer {
         keys.remove("tick_header");
@@ -224,16 +225,16 @@ pub(super) fn told_json(mut answer: Value, header: &MessageHeader, warnings: &[S
     answer
 }
 
-/// What holds a verdict, with its word in place of the code.
+/// A result with a verdict as JSON, with the verdict's word in place of the code.
 pub(super) fn worded(what: &impl Serialize, verdict: u8) -> Value {
     let mut told = json!(what);
     told["verdict"] = json!(word(verdict));
     told
 }
 
-/// Adds lines of bodies whose place is not known, and of how many were left out for what.
+/// Adds lines for bodies of unknown pose, and for the numbers of those left out, by reason.
 ///
-/// * `counts` - how many, with the words for one and for many.
+/// * `counts` - numbers, each with its text for one and for many.
 pub(super) fn strangers(
     told: &mut Vec<(&str, String)>,
     (unknown, more): (&[UnknownBody], u64),
@@ -255,12 +256,12 @@ pub(super) fn word(verdict: u8) -> &'static str {
     Verdict::from_code(verdict).map_or("?", Verdict::word)
 }
 
-/// An end of an interval, in metres.
+/// An end of an interval, in metres; `open` if there is none.
 pub(super) fn end(value: Option<f64>, open: &str) -> String {
     value.map_or_else(|| open.to_owned(), metres)
 }
 
-/// Three coordinates.
+/// Three coordinates as text.
 pub(super) fn triple(values: Option<[f64; 3]>) -> String {
     match values {
         Some([x, y, z]) => format!("{} {} {}", metres(x), metres(y), metres(z)),
@@ -268,7 +269,7 @@ pub(super) fn triple(values: Option<[f64; 3]>) -> String {
     }
 }
 
-/// Lines of what is said and of its value, then the warnings.
+/// One line per label and value, then the warnings.
 pub(super) fn lines<'a>(
     told: impl IntoIterator<Item = (&'a str, String)>,
     warnings: &[String],
@@ -283,7 +284,7 @@ pub(super) fn lines<'a>(
     text
 }
 
-/// What would move the cursor is not shown.
+/// Replaces control characters, which could move the cursor.
 pub(super) fn clean(text: &str) -> String {
     text.chars()
         .map(|c| if c.is_control() { '?' } else { c })

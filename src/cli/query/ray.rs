@@ -1,4 +1,4 @@
-//! `sweepd query --ray`: what a ray hits first. In: flags. Out: text, or one JSON object.
+//! `sweepd query --ray`: the first body that a ray hits. In: flags. Out: text, or one JSON object.
 
 use std::sync::atomic::AtomicBool;
 
@@ -11,9 +11,9 @@ use crate::cli::out::Out;
 use crate::error::Result;
 use crate::wire::RayFound;
 
-/// Asks, waits and tells.
+/// Asks the daemon, waits and prints the answer.
 ///
-/// * `ray` - where it begins, metres, and where it goes.
+/// * `ray` - start point, metres, and direction.
 pub(super) fn ray(
     ray: Numbers<6>,
     args: &QueryArgs,

@@ -1,5 +1,5 @@
-//! `sweepd query --touching NAME`, `--shape JSON`: what a body or a shape touches or would touch. In: flags. Out: text,
-//! or one JSON object.
+//! `sweepd query --touching NAME`, `--shape JSON`: the bodies that a body or a shape touches or would touch. In: flags.
+//! Out: text, or one JSON object.
 
 use std::sync::atomic::AtomicBool;
 
@@ -11,10 +11,10 @@ use crate::cli::out::Out;
 use crate::error::{Error, Result, counted};
 use crate::wire::{TouchingFound, TouchingRow};
 
-/// What to do where a shape is none.
+/// The remedy for an invalid shape.
 const SHAPE_MEND: &str = r#"write a shape as '{"type": "sphere", "radius": 0.5}'"#;
 
-/// Asks, waits and tells.
+/// Asks the daemon, waits and prints the answer.
 pub(super) fn touching(args: &QueryArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
     let asked = question(args)?;
     let named: Vec<&str> = args.touching.touching.as_deref().into_iter().collect();
@@ -109,7 +109,7 @@ fn as_text(found: &TouchingFound, warnings: &[String]) -> String {
     lines(told, warnings)
 }
 
-/// A row: who, and the proved gap in metres.
+/// One row as text: the bodies, and the proved gap in metres.
 fn sentence(row: &TouchingRow) -> String {
     let of = row.a.as_deref().map(|a| format!("{} and ", clean(a)));
     let touching = if row.known.touching {
@@ -117,7 +117,7 @@ fn sentence(row: &TouchingRow) -> String {
     } else {
         ""
     };
-    // Words have no unit.
+    // "not known" has no unit.
     let unit = row.known.gap_best_m.map_or("", |_| " m");
     format!(
         "{}{}{touching}: gap {}{unit}, proved {} .. {}",

@@ -1,7 +1,7 @@
-//! `sweepd record FILE`: what a running daemon publishes, heard as any client hears it, in a file for people.
+//! `sweepd record FILE`: records, as a client, what a running daemon publishes, into a file for viewers.
 //!
-//! In: an instance. Out: an MCAP file of ROS 2 messages. The daemon takes no notice but that it is listened to, so any
-//! daemon can be recorded at any time; what it was given is known to itself alone (`run --record`).
+//! In: an instance. Out: an MCAP file of ROS 2 messages. The daemon only gets one more subscriber, so any daemon can be
+//! recorded at any time. Its inputs are not published; `run --record` records them.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -18,29 +18,29 @@ use crate::time::{Clock, SystemClock};
 use crate::transport::client::{Client, Heard, Message, Restarted, Topics, View};
 use crate::wire::{MessageHeader, TickRow};
 
-/// Longest wait before a look at the stop flag, nanoseconds.
+/// Longest wait between two checks of the stop flag, nanoseconds.
 const LOOK_NS: u64 = 100_000_000;
 
-/// What is listened to comes with the first ticks that are heard of a boot: for so long ticks without are passed over,
-/// nanoseconds. Their rows would be without names, or missing.
+/// Requested rows are missing in the first ticks of a boot that a client receives. For at most this long such ticks are
+/// skipped, nanoseconds: they would be recorded without rows or without names.
 const FIRST_WAIT_NS: u64 = 1_000_000_000;
 
 type Log = McapLog<BufWriter<File>>;
 
-/// What was heard so far.
+/// State of the recording.
 #[derive(Default)]
 struct Tally {
-    /// Ticks that were overtaken before they were heard.
+    /// Ticks that newer ones overtook before they were received.
     missed: u64,
     /// The newest tick of this boot; tick 0: none yet.
     last: TickRow,
-    /// Number of the last tick of this boot that was heard when it had ended.
+    /// Number of the last tick of this boot that was received complete.
     ended: u64,
     /// Boot id and tick of the names that were written last.
     names: (u64, u64),
 }
 
-/// Records until a signal, or for as long as is asked for.
+/// Records until a signal, or until the requested ticks or time are over.
 pub(in crate::cli) fn record(args: &RecordArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
     // Without a daemon no file is touched.
     let Some(mut client) = connect(&args.which.instance, None, args.wait, stop)? else {
@@ -54,7 +54,7 @@ pub(in crate::cli) fn record(args: &RecordArgs, out: &mut Out, stop: &AtomicBool
     client.subscribe(topics(args))?;
     let mut tally = Tally::default();
     let done = follow(args, &mut client, &mut log, &mut tally, stop);
-    // Whatever ended it, the file is closed and says so.
+    // The file is closed in every case, with the reason for the end.
     let why = done.as_ref().err().map_or(String::new(), Error::to_string);
     let closed = log.end(&why, tally.missed);
     let missed = tally.missed;
@@ -76,7 +76,7 @@ pub(in crate::cli) fn record(args: &RecordArgs, out: &mut Out, stop: &AtomicBool
     done.and(closed).map(|()| true)
 }
 
-/// What is listened to.
+/// The topics to subscribe to.
 fn topics(args: &RecordArgs) -> Topics {
     let only = |topic| args.only.is_empty() || args.only.contains(&topic);
     Topics {
@@ -88,7 +88,7 @@ fn topics(args: &RecordArgs) -> Topics {
     }
 }
 
-/// Whether all of these came.
+/// Whether the rows of all these topics came.
 fn has_all(view: &View, topics: Topics) -> bool {
     view.names().is_some()
         && (!topics.pairs || view.pairs().is_some())
@@ -151,10 +151,10 @@ impl Tally {
         let tick = view.tick();
         let now = tick.header.tick;
         if self.last.header.tick == 0 {
-            // What was before the first that is heard is not missed.
+            // Ticks before the first received one are not missed.
             self.ended = now.saturating_sub(1);
         }
-        // A long tick is told of more than once, each time under its number; its end is the whole of it.
+        // A long tick is received several times under one number; it is complete only at its end.
         let has_ended = !view.is_under_way();
         if has_ended {
             self.missed += now.saturating_sub(self.ended + 1);
@@ -210,7 +210,7 @@ mod tests {
             assert_eq!((log.ticks(), tally.missed), (ticks, 0));
             server.publish(&out).unwrap();
         }
-        // One whose end is overtaken is missed.
+        // A tick whose end was overtaken is missed.
         for (tick, is_whole, missed) in [(2, false, 0), (3, true, 1), (4, false, 1), (6, true, 3)] {
             out.tick.header.tick = tick;
             if is_whole {
@@ -239,7 +239,7 @@ mod tests {
             names_changed: true,
             ..Outbox::default()
         };
-        // A daemon that has not seen yet that somebody listens publishes names alone.
+        // A daemon that does not know its subscribers yet publishes only names.
         for (tick, comes) in [(1, false), (2, true)] {
             for header in [
                 &mut out.tick.header,

@@ -1,4 +1,4 @@
-//! `sweepd report error`: error against run time, a line a budget.
+//! `sweepd report error`: error against run time, one line per budget.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -16,10 +16,10 @@ use crate::scene::Scene;
 use super::{Page, stopped};
 use crate::cli::progress::Progress;
 
-/// Budgets in one sweep at most: each has an engine of its own.
+/// Most budgets in one sweep: each has its own engine.
 const BUDGETS_MAX: usize = 64;
 
-/// Runs the sweep; `false` when a verdict is wrong or an interval excludes the truth.
+/// Runs the sweep; `false` if a verdict is wrong or an interval excludes the truth.
 pub(super) fn error(args: &ErrorArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
     args.course.check()?;
     let sweep = sweep(args)?;
@@ -47,7 +47,7 @@ pub(super) fn error(args: &ErrorArgs, out: &mut Out, stop: &AtomicBool) -> Resul
     .ok_or_else(stopped)?;
     drop(progress);
     let scene = args.scene.display().to_string();
-    // Before the table: who reads that may have gone.
+    // Written before the table: the reader of standard output may be gone.
     if let Some(page) = page {
         page.write(&html(&report, &scene))?;
     }

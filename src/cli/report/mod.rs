@@ -1,4 +1,4 @@
-//! `sweepd report`: what the library finds out, in tables, as JSON and as pages of HTML.
+//! `sweepd report`: prints the reports of the library as tables, as JSON and as HTML pages.
 
 mod error;
 mod stability;
@@ -13,7 +13,7 @@ use super::args_report::Report;
 use super::files::Draft;
 use super::out::Out;
 
-/// Runs a report; `false` when it found something wrong.
+/// Runs a report; `false` if it found something wrong.
 pub(super) fn report(args: &ReportArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
     match &args.report {
         Report::Error(args) => error::error(args, out, stop),
@@ -21,7 +21,7 @@ pub(super) fn report(args: &ReportArgs, out: &mut Out, stop: &AtomicBool) -> Res
     }
 }
 
-/// A page to be written when all is done.
+/// A page that is written at the end of a report.
 struct Page(Draft);
 
 impl Page {
@@ -37,7 +37,7 @@ impl Page {
     }
 }
 
-/// What a report that was stopped by a signal ends with.
+/// The error of a report that a signal stopped.
 fn stopped() -> Error {
     Error::Refused("stopped by a signal before the report was done; there is no result".to_owned())
 }

@@ -1,4 +1,4 @@
-//! `sweepd report stability`: stiff and extreme cases, a line a family.
+//! `sweepd report stability`: stiff and extreme cases, one line per family.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -12,7 +12,7 @@ use crate::report::stability::{Found, Report, page, run};
 use super::{Page, stopped};
 use crate::cli::progress::Progress;
 
-/// Plays the families that were asked for, or lists them; `false` when something is wrong.
+/// Runs the requested families, or lists them; `false` if something is wrong.
 pub(super) fn stability(args: &StabilityArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
     if args.list {
         return list(args.json, out);
@@ -26,7 +26,7 @@ pub(super) fn stability(args: &StabilityArgs, out: &mut Out, stop: &AtomicBool) 
     })?
     .ok_or_else(stopped)?;
     drop(progress);
-    // Before the table: who reads that may have gone.
+    // Written before the table: the reader of standard output may be gone.
     if let Some(page) = page {
         page.write(&page::html(&report))?;
     }
@@ -62,7 +62,7 @@ fn list(json: bool, out: &mut Out) -> Result<bool> {
     Ok(true)
 }
 
-/// The families of these names, each once, in the report's order; all of them where none is named.
+/// The families with these names, each once, in the report's order; all families if no name is given.
 fn chosen(names: &[String]) -> Result<Vec<&'static Family>> {
     if let Some(unknown) = names.iter().find(|name| named(name).is_none()) {
         let all: Vec<_> = FAMILIES.iter().map(|family| family.name).collect();
@@ -128,7 +128,7 @@ fn line(found: &Found) -> String {
     )
 }
 
-/// Where the worst error of a family is, and what else is to be said of it.
+/// Where the worst error of a family is, and notes on its answers.
 fn worst(found: &Found) -> Option<String> {
     let sum = &found.summary;
     let mut text = format!("{:<14} ", found.family);

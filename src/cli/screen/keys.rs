@@ -1,5 +1,5 @@
-//! Keys on the terminal that `sweepd monitor` draws on. In: what is typed, and signals. Out: whether `q` was. The
-//! terminal is as before when it ends, by `q`, by a signal or by a panic, and while it is stopped.
+//! Keys on the terminal that `sweepd monitor` draws on. In: typed keys, and signals. Out: whether `q` was typed. The
+//! terminal is restored at the end, by `q`, by a signal or by a panic, and while the process is stopped.
 
 use std::io::IsTerminal as _;
 use std::sync::atomic::AtomicBool;
@@ -13,7 +13,7 @@ use crate::cli::signals::{Asked, EXIT_SIGNALS, asking, stop_at_first};
 use crate::error::{Error, Result};
 use crate::time::{Clock as _, SystemClock};
 
-/// Reads keys one by one from [`Keys::open`] on.
+/// Reads single keys after [`Keys::open`].
 #[derive(Debug)]
 pub(super) struct Keys {
     terminal: Arc<Terminal>,
@@ -21,11 +21,11 @@ pub(super) struct Keys {
 }
 
 impl Keys {
-    /// Watches signals, so that none leaves the terminal changed; returns also the flag that those raise which ask for
-    /// an end.
+    /// Watches signals, so that none leaves the terminal changed. Also returns the flag that SIGINT, SIGTERM and SIGHUP
+    /// raise.
     ///
     /// # Errors
-    /// `Error::Io` when signals cannot be listened for.
+    /// `Error::Io` if signals cannot be watched.
     pub(super) fn watch() -> Result<(Self, Arc<AtomicBool>)> {
         let failed = |e| Error::io("cannot listen for signals", e);
         let stop = stop_at_first()?;
@@ -47,12 +47,12 @@ impl Keys {
         Ok((keys, stop))
     }
 
-    /// From now on keys are read one by one and not shown; `false`: there is no terminal to type on.
+    /// Switches the terminal to single keys without echo; `false`: there is no terminal to type on.
     pub(super) fn open(&self) -> bool {
         self.terminal.open()
     }
 
-    /// Whether `q` was typed since the last look.
+    /// Whether `q` was typed since the last call.
     pub(super) fn is_end_typed(&self) -> bool {
         self.terminal.is_typed(b'q')
     }
@@ -74,7 +74,7 @@ struct Terminal {
 #[derive(Debug, Default)]
 struct Modes {
     is_open: bool,
-    /// What is to be set again; none while nothing was changed.
+    /// The modes to restore; `None`: nothing was changed.
     before: Option<Termios>,
 }
 
@@ -112,7 +112,7 @@ impl Terminal {
     }
 
     fn is_typed(&self, key: u8) -> bool {
-        // Who reads in the background is stopped.
+        // The kernel stops a process that reads in the background.
         if self.lock().before.is_none() || !is_in_front() {
             return false;
         }
@@ -123,7 +123,7 @@ impl Terminal {
 }
 
 impl Modes {
-    /// Sets the terminal so that a read returns what is there at once; keys that send signals still do.
+    /// Makes a read return at once with the keys typed so far, without echo; keys that send signals still do.
     fn change(&mut self) {
         if !self.is_open || self.before.is_some() || !is_in_front() {
             return;
@@ -142,7 +142,7 @@ impl Modes {
     }
 
     fn restore(&mut self) {
-        // In the background the terminal is another's.
+        // In the background the terminal belongs to another process.
         if let Some(before) = self.before.take()
             && is_in_front()
         {
@@ -151,7 +151,7 @@ impl Modes {
     }
 }
 
-/// Whether what is typed on the terminal behind standard input is for this process.
+/// Whether keys typed on the terminal behind standard input go to this process.
 fn is_in_front() -> bool {
     let stdin = std::io::stdin();
     stdin.is_terminal()

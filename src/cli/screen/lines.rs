@@ -1,4 +1,4 @@
-//! Lines of the screen. In: parts of a line, colours, the width of the terminal. Out: lines that fit into it, broken
+//! Lines of the screen. In: parts of a line, colours, the width of the terminal. Out: lines within that width, broken
 //! between parts and never within one.
 
 pub(super) const RED: &str = "\x1b[31m";
@@ -7,10 +7,10 @@ pub(super) const GREEN: &str = "\x1b[32m";
 pub(super) const BOLD: &str = "\x1b[1m";
 const RESET: &str = "\x1b[0m";
 
-/// Columns of the words that say what a line is about; what goes on in the next line begins behind them.
+/// Width of a line's label, columns; continuation lines are indented by as much.
 const LABEL_WIDTH: usize = 11;
 
-/// Colours, or none.
+/// Whether to use colours.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ink {
     pub(super) colours: bool,
@@ -26,7 +26,7 @@ impl Ink {
     }
 }
 
-/// Columns that a text takes; colours take none.
+/// Columns that a text takes; colour codes take none.
 pub(super) fn columns(text: &str) -> usize {
     let mut chars = text.chars();
     let mut count = 0;
@@ -39,7 +39,7 @@ pub(super) fn columns(text: &str) -> usize {
     count
 }
 
-/// Appends the parts with gaps between them; what does not fit any more begins a line of its own, below the first part.
+/// Appends the parts with gaps between them. A part that does not fit begins a new line, indented by the label's width.
 pub(super) fn flow(text: &mut String, parts: &[String], gap: &str, width: usize) {
     let mut line = String::new();
     for part in parts.iter().filter(|part| !part.is_empty()) {
@@ -51,7 +51,7 @@ pub(super) fn flow(text: &mut String, parts: &[String], gap: &str, width: usize)
         } else {
             *text += line.trim_end();
             line = format!("\n{:LABEL_WIDTH$}{part}", "");
-            // The line's end before it takes no column.
+            // The newline before the line takes no column.
             text.extend(line.drain(..1));
         }
     }

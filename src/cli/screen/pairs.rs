@@ -1,5 +1,5 @@
-//! The table of pairs on the screen. In: rows, names, the width of the terminal. Out: lines that fit into it: names are
-//! shortened first, then `closing`, the event and the lower end of the gap go. A number is never cut.
+//! The table of pairs on the screen. In: rows, names, the width of the terminal. Out: lines within that width. Names
+//! are shortened first, then `closing`, the event and the lower end of the gap are dropped. A number is never cut.
 
 use crate::wire::{EndCause, Event, PairRow, Verdict, pair_flags};
 
@@ -7,31 +7,31 @@ use super::lines::{Ink, RED, YELLOW};
 use crate::cli::figures::{cut, number, number_within};
 use crate::cli::monitor::Names;
 
-/// Columns of a body's name; longer ones are cut.
+/// Most columns of a body's name; longer names are cut.
 pub(super) const NAME_WIDTH: usize = 24;
-/// Columns to which names are shortened before a column of numbers goes.
+/// Least columns of a name before a column of the table is dropped.
 pub(super) const NAME_LEAST: usize = 8;
 const VERDICT_WIDTH: usize = 9;
-/// Columns of an end of the gap and of the closing speed: where there is room, and where there is not.
+/// Widths of an end of the gap and of the closing speed, columns: wide and narrow.
 const GAP_WIDTHS: [usize; 2] = [12, 10];
 const CLOSING_WIDTHS: [usize; 2] = [9, 8];
-/// Columns of the event: of most of its texts, and of its words alone.
+/// Width of the event, columns: for most full texts, and for single words.
 const EVENT_WIDE: usize = 16;
 const EVENT_LEAST: usize = 8;
 
-/// Which columns there are, and how wide.
+/// The columns of the table, and their widths.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PairTable {
     name: usize,
     gap: usize,
     has_low: bool,
-    /// 0: it has none; likewise the event.
+    /// 0: no such column; likewise for `event`.
     closing: usize,
     event: usize,
 }
 
 impl PairTable {
-    /// The table in so many columns.
+    /// Fits the table into `width` columns.
     ///
     /// * `longest` - columns of the longest name of a body.
     pub(super) fn fit(width: usize, longest: usize) -> Self {
@@ -67,7 +67,7 @@ impl PairTable {
                 break;
             }
         }
-        // A name of which nothing is left tells less than a line that is too long.
+        // A name with no characters left tells less than a line that is too long.
         table.name = table.name.max(longest.min(NAME_LEAST));
         table.with_event_in(width)
     }
@@ -83,7 +83,7 @@ impl PairTable {
         2 * (self.name + 1) + VERDICT_WIDTH + numbers + closing + event
     }
 
-    /// The event has what the others leave.
+    /// Gives the event the width that the other columns leave.
     fn with_event_in(mut self, width: usize) -> Self {
         if self.event > 0 {
             self.event += width.saturating_sub(self.width());
@@ -91,7 +91,7 @@ impl PairTable {
         self
     }
 
-    /// What stands above the rows.
+    /// The head line above the rows.
     pub(super) fn head(self) -> String {
         let heads = if self.gap == GAP_WIDTHS[0] {
             ["gap from [m]", "to [m]"]
@@ -103,7 +103,7 @@ impl PairTable {
         self.line(["a", "b", "verdict", heads[0], heads[1], "closing", "event"])
     }
 
-    /// A row.
+    /// One row as a line.
     pub(super) fn row(self, row: &PairRow, names: &Names, ink: Ink) -> String {
         let verdict = Verdict::from_code(row.verdict);
         let colour = match verdict {
@@ -143,7 +143,7 @@ impl PairTable {
     }
 }
 
-/// What happened to a pair: in full, and as one word.
+/// The events of a pair: each in full, and as one word.
 fn events(row: &PairRow) -> Vec<(String, &'static str)> {
     let mut events = Vec::new();
     for event in row.told_events() {
@@ -169,7 +169,7 @@ fn events(row: &PairRow) -> Vec<(String, &'static str)> {
     events
 }
 
-/// Events in so many columns: in full, else as words, else as many words as fit and a `+` for the others.
+/// Events in at most `width` columns: in full, else as words, else as many words as fit and a `+` for the others.
 fn told_within(events: &[(String, &'static str)], width: usize) -> String {
     let full: Vec<&str> = events.iter().map(|(full, _)| full.as_str()).collect();
     let words: Vec<&str> = events.iter().map(|(_, word)| *word).collect();
@@ -231,7 +231,7 @@ mod tests {
                 assert!(table.head().ends_with("event"), "{}", table.head());
             }
         }
-        // Where there is no more room than on the smallest of screens, the gap's upper end stays.
+        // On a terminal narrower than the smallest screen the gap's upper end stays.
         for width in 0..59 {
             let line = PairTable::fit(width, 24).row(&row(0), &names, ink);
             assert!(line.contains(" 9.876543"), "{width}: {line}");

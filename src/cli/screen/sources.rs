@@ -1,5 +1,5 @@
-//! The table of sources on the screen. In: a tick, the width of the terminal. Out: lines that fit into it: names are
-//! shortened first, then columns go whole. A number is never cut.
+//! The table of sources on the screen. In: a tick, the width of the terminal. Out: lines within that width. Names are
+//! shortened first, then whole columns are dropped. A number is never cut.
 
 use crate::wire::{SourceRow, TickRow, name_str};
 
@@ -8,19 +8,19 @@ use super::pairs::{NAME_LEAST, NAME_WIDTH};
 use crate::cli::figures::{cut, time};
 
 const HEADS: [&str; 5] = ["state", "age", "frame", "skipped", "refused"];
-/// Least columns of each: where there is room, and where there is not.
+/// Least widths of the columns: wide and narrow.
 const LEAST_WIDTHS: [[usize; 5]; 2] = [[11, 10, 12, 10, 10], [11, 9, 9, 8, 8]];
-/// Which of them go, in this order.
+/// Indices of the columns that are dropped, in this order.
 const GO_FIRST: [usize; 3] = [3, 2, 4];
 
-/// Columns, and how wide.
+/// The columns of the table, and their widths.
 struct SourceTable {
     name: usize,
-    /// 0: it is left out.
+    /// 0: the column is dropped.
     widths: [usize; 5],
 }
 
-/// The sources of a tick, a line each, below a line that says what is what; none where it has none.
+/// The sources of a tick, one line each, below a head line; empty if the tick has none.
 pub(super) fn table(tick: &TickRow, width: usize, ink: Ink) -> Vec<String> {
     let sources = tick.sources.iter().take(usize::from(tick.sources_len));
     let name = |source: &SourceRow| name_str(&source.name).unwrap_or("?").to_owned();
@@ -37,7 +37,7 @@ pub(super) fn table(tick: &TickRow, width: usize, ink: Ink) -> Vec<String> {
     std::iter::once(head).chain(rows).collect()
 }
 
-/// What stands in the columns, and the colour of the state.
+/// The colour of the state, and the texts of the columns.
 type Cells = (&'static str, [String; 5]);
 
 fn cells(source: &SourceRow) -> Cells {
