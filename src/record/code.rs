@@ -1,7 +1,8 @@
-//! The messages of a recording as bytes and back; `msgs/record` describes them.
+//! Encodes and decodes the messages of a recording; `msgs/record` describes the format.
 //!
-//! Rows of the contract, little-endian: exact for every float, as fast as memory, and readable with what `msgs/` has
-//! for other languages. What is rare (edits, settings) is there in few bytes; a tick without it pays a count.
+//! Rows as on the wire, little-endian: exact for every float, as fast as a memory copy, and readable with the
+//! definitions that `msgs/` has for other languages. Rare parts (edits, settings) take few bytes; without them a tick
+//! stores only a count.
 
 mod rare;
 
@@ -15,14 +16,14 @@ use crate::wire::{
 
 use rare::{put_between, put_edit, put_files, take_between, take_edit, take_files};
 
-/// Stands for nothing where a place or a reason is one byte.
+/// Stands for no source or no reason where these take one byte.
 const NONE: u8 = u8::MAX;
-/// Bytes of a frame's head, at least; a list cannot have more frames than fit.
+/// Least bytes of a frame, which bounds the number of frames that a list may claim.
 const HEAD_BYTES: usize = 32;
 
 type Taken<T> = Result<T, Damaged>;
 
-/// A start as bytes.
+/// Encodes a start.
 #[must_use]
 pub(super) fn start_bytes(start: &Start) -> Vec<u8> {
     let mut to = Vec::new();
@@ -33,10 +34,11 @@ pub(super) fn start_bytes(start: &Start) -> Vec<u8> {
     to
 }
 
-/// A start of bytes.
+/// Decodes a start.
 ///
 /// # Errors
-/// `Error::Refused` when it is damaged, or of another layout or wire version.
+/// `Error::Refused` if it is damaged, or of another layout or wire version; `Error::Io` if its facts are not the
+/// expected JSON.
 pub(super) fn start_of(bytes: &[u8]) -> Outcome<Start> {
     let damaged = |_| Error::Refused("the recording's start is damaged: record anew".to_owned());
     let mut from = Take(bytes);
@@ -68,7 +70,7 @@ pub(super) fn start_of(bytes: &[u8]) -> Outcome<Start> {
     })
 }
 
-/// Writes what the engine was given for a tick behind what is there.
+/// Appends what the engine was given for a tick.
 pub(super) fn put_input(record: &TickRecord, to: &mut Vec<u8>) {
     let ask = &record.ask;
     record.out.tick.header.tick.put(to);
@@ -92,10 +94,10 @@ pub(super) fn put_input(record: &TickRecord, to: &mut Vec<u8>) {
     put_inbox(&record.inbox, to);
 }
 
-/// Reads that into a record; returns the tick's number.
+/// Decodes what [`put_input`] appends into a record; returns the tick's number.
 ///
 /// # Errors
-/// When the bytes are no such thing.
+/// If the bytes are no input.
 pub(super) fn take_input(bytes: &[u8], into: &mut TickRecord) -> Taken<u64> {
     let mut from = Take(bytes);
     into.clear();
@@ -125,7 +127,7 @@ pub(super) fn take_input(bytes: &[u8], into: &mut TickRecord) -> Taken<u64> {
     Ok(tick)
 }
 
-/// Writes what a tick published behind what is there: of what nobody listened to nothing.
+/// Appends what a tick published. The outbox of a record has no rows that lack readers.
 pub(super) fn put_output(out: &Outbox, demand: Demand, to: &mut Vec<u8>) {
     let news = u8::from(out.names_changed) | u8::from(out.plan_changed) << 1;
     [demand_bits(demand), news, 0, 0].put(to);
@@ -147,10 +149,10 @@ pub(super) fn put_output(out: &Outbox, demand: Demand, to: &mut Vec<u8>) {
     put_run(out.plan.as_bytes(), to);
 }
 
-/// Reads that.
+/// Decodes what [`put_output`] appends.
 ///
 /// # Errors
-/// When the bytes are no such thing.
+/// If the bytes are no output.
 pub(super) fn take_output(bytes: &[u8], out: &mut Outbox) -> Taken<()> {
     let mut from = Take(bytes);
     let [_, news, ..] = <[u8; 4]>::take(&mut from)?;

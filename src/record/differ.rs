@@ -1,14 +1,14 @@
-//! Bit by bit: where a replayed tick first differs from the recorded one.
+//! Bitwise comparison: where a replayed tick first differs from the recorded one.
 //!
-//! Rows of bodies come first, then pairs, contacts, regions, verdicts, the tick's figures: a cause before what follows
-//! from it.
+//! Rows of bodies come first, then pairs, contacts, regions, verdicts, the fields of the tick, names and the plan: a
+//! cause is found before its effects.
 
 use super::bytes::{Differing, Field};
 use crate::wire::{
     BodyRow, ContactRow, Demand, MessageHeader, NameRow, Outbox, PairRow, RegionRow,
 };
 
-/// Fields of the tick that are measured times, or follow from such: no replay has the same.
+/// Fields of the tick that are measured times, or follow from them: no two runs agree on them.
 pub const TIMES: &[&str] = &[
     "sent_ns",
     "elapsed_ns",
@@ -21,7 +21,7 @@ pub const TIMES: &[&str] = &[
 /// Where two outboxes differ.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Spot {
-    /// Which message, and which of its rows.
+    /// The message, and its row.
     pub(super) place: String,
     /// Bodies of that row.
     pub(super) bodies: Vec<u64>,
@@ -30,7 +30,7 @@ pub(super) struct Spot {
     pub(super) replayed: String,
 }
 
-/// The first difference in what somebody listened to; [`TIMES`] are left out.
+/// The first difference in the rows that have readers, the tick, the names and the plan; [`TIMES`] are left out.
 pub(super) fn first(recorded: &Outbox, replayed: &Outbox, demand: Demand) -> Option<Spot> {
     let (a, b) = (recorded, replayed);
     let bodies = |on: bool| {
@@ -85,7 +85,7 @@ impl Spot {
         }
     }
 
-    /// Of something without fields.
+    /// A difference in something without fields.
     pub(super) fn whole(place: &str, recorded: &str, replayed: &str) -> Self {
         Self {
             place: place.to_owned(),
@@ -96,12 +96,12 @@ impl Spot {
     }
 }
 
-/// A row that is about bodies.
+/// A row that refers to bodies.
 trait About: Field + std::fmt::Debug {
-    /// Which rows are of one thing: rows of a message are in this order.
+    /// The sort key of the rows of a message; rows with equal keys describe the same thing.
     fn key(&self) -> [u64; 3];
 
-    /// The bodies it is about.
+    /// The bodies that the row refers to.
     fn bodies(&self) -> Vec<u64>;
 }
 
@@ -118,7 +118,7 @@ about! {
     BodyRow: |row| [row.body, 0, 0], vec![row.body];
     NameRow: |row| [row.body, 0, 0], vec![row.body];
     PairRow: |row| [row.body_a, row.body_b, 0], vec![row.body_a, row.body_b];
-    // Contacts of one pair have an order of their own.
+    // Contacts of one pair keep the order of the message.
     ContactRow: |row| [row.body_a, row.body_b, 0], vec![row.body_a, row.body_b];
     RegionRow: |row| [row.body_a, row.body_b, u64::from(row.index)], vec![row.body_a, row.body_b];
 }
@@ -231,7 +231,7 @@ mod tests {
         let spot = first(&a, &b, Demand::ALL).unwrap();
         assert_eq!(spot.field, "gap_best_m");
         assert_ne!(spot.recorded, spot.replayed);
-        // Nobody listened.
+        // Rows without readers are not compared.
         assert_eq!(first(&a, &b, Demand::default()), None);
     }
 

@@ -1,4 +1,4 @@
-//! What a recording holds: the start, and each tick with all that the engine was given for it and all that it said.
+//! Content of a recording: the start, and for each tick all that the engine was given and all that it published.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,22 +12,22 @@ use crate::transport::Setting;
 use crate::wire::{Demand, Inbox, Outbox, TickCause, WIRE_VERSION};
 use crate::world::{Applied, TreeOf};
 
-/// Number of the layout of our messages in a recording; another is not read. 2: `number` in `VertexHeader`;
+/// Version of the layout of our messages in a recording; another version is not read. 2: `number` in `VertexHeader`;
 /// 3: `since_ns`, `first_seq` and `cut` of frames.
 pub const LAYOUT: u32 = 3;
 
-/// How a daemon began.
+/// The start of a daemon: its settings and its scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Start {
-    /// What fits in words and numbers.
+    /// Versions and settings.
     pub facts: Facts,
     /// The text of the scene file.
     pub scene: String,
-    /// The mesh files that it names.
+    /// The mesh files that the scene names.
     pub files: Contents,
 }
 
-/// What is said of a start in JSON.
+/// Versions and settings of a start, stored as JSON.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Facts {
     /// [`LAYOUT`] of the recorder.
@@ -38,26 +38,26 @@ pub struct Facts {
     pub sweepd_version: String,
     /// Random number of this start of the daemon.
     pub boot_id: u64,
-    /// When the engine was made, nanoseconds of `CLOCK_BOOTTIME`.
+    /// Time at which the engine was made, nanoseconds of `CLOCK_BOOTTIME`.
     pub started_ns: u64,
-    /// What is to be added to a time of `CLOCK_BOOTTIME` for nanoseconds since 1970.
+    /// What to add to a time of `CLOCK_BOOTTIME` for nanoseconds since 1970.
     pub since_1970_ns: u64,
     /// Name of the scene file, for messages.
     pub scene_file: String,
-    /// What makes a tick, in the words of `--mode`; flags have been heeded.
+    /// What triggers a tick, in the syntax of `--mode`; flags are applied.
     pub mode: String,
-    /// Time a tick may take, nanoseconds; null: no limit. It can change while running: each tick has its own.
+    /// Time budget of a tick, nanoseconds; null: no limit. It can change while running: each tick has its own.
     pub budget_ns: Option<u64>,
-    /// Work units a tick may take; null: no limit.
+    /// Work budget of a tick, units; null: no limit.
     pub budget_units: Option<u64>,
-    /// Threads that a tick may work with.
+    /// Number of threads that a tick may use.
     pub threads: usize,
 }
 
 impl Start {
-    /// Of a daemon about to run.
+    /// The start of a daemon that is about to run.
     ///
-    /// * `scene` - as it runs it, flags heeded.
+    /// * `scene` - as the daemon runs it, with flags applied.
     /// * `started_ns` - `Engine::now_ns` before the first tick.
     #[must_use]
     pub fn of(scene: &Scene, text: String, files: Contents, boot_id: u64, started_ns: u64) -> Self {
@@ -82,40 +82,40 @@ impl Start {
     }
 }
 
-/// One tick: what went in, what came out. Its memory goes round.
+/// One tick: its input and its output. Its memory is reused.
 #[derive(Clone, Debug, Default)]
 pub struct TickRecord {
-    /// What was done to the engine since the tick before, in order.
+    /// Changes of the engine since the previous tick, in order.
     pub between: Vec<Between>,
-    /// Frames, vertices and ended sessions, as they were handed over.
+    /// Frames, vertices and ended sessions, as the engine got them.
     pub inbox: Inbox,
     /// Edits, in order.
     pub edits: Vec<EditRecord>,
-    /// Everything of the tick's input that is a number.
+    /// The numbers of the tick's input.
     pub ask: Ask,
     /// The engine's time of the tick, nanoseconds of `CLOCK_BOOTTIME`.
     pub now_ns: u64,
-    /// What it published; of what nobody listened to nothing.
+    /// What the engine published; lists without readers are empty.
     pub out: Outbox,
 }
 
 /// The numbers of a tick's input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ask {
-    /// Who listened.
+    /// The outputs that had readers.
     pub demand: Demand,
-    /// What might be spent.
+    /// The budget of the tick.
     pub budget: Budget,
-    /// Why this tick.
+    /// The cause of the tick.
     pub cause: TickCause,
-    /// Place of the source whose frame caused it.
+    /// Index of the source whose frame caused it.
     pub cause_source: Option<usize>,
-    /// When the daemon woke for it, nanoseconds of `CLOCK_MONOTONIC`.
+    /// Time at which the daemon woke for it, nanoseconds of `CLOCK_MONOTONIC`.
     pub woke_ns: u64,
 }
 
 impl Ask {
-    /// Of a tick's input.
+    /// The numbers of a tick's input.
     #[must_use]
     pub fn of(input: &TickInput<'_>) -> Self {
         Self {
@@ -140,35 +140,35 @@ impl Default for Ask {
     }
 }
 
-/// Something done to an engine between two ticks.
+/// A change of an engine between two ticks.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Between {
-    /// Frames of a source (`None`: of none of the scene) were passed over for newer ones.
+    /// Frames of a source were skipped for newer ones; `None`: of a source that the scene does not have.
     Skipped {
-        /// Place of the source.
+        /// Index of the source.
         source: Option<u32>,
-        /// How many.
+        /// Number of frames.
         frames: u64,
     },
     /// The time-out of a source was set.
     Timeout {
-        /// Place of the source.
+        /// Index of the source.
         source: u32,
         /// Nanoseconds.
         timeout_ns: u64,
     },
-    /// A worker was handed a loose tree to build anew.
+    /// A worker got a loose tree to rebuild.
     TreeAsked(TreeMark),
-    /// What it built was handed over, and taken or not.
+    /// The worker's tree was handed to the engine, which took it or not.
     TreeBuilt(TreeMark, bool),
-    /// It could not build it.
+    /// The worker could not build the tree.
     TreeRefused(TreeMark),
-    /// What makes a tick was set, in the words of `--mode`; for readers: the engine does not know it.
+    /// The trigger of ticks was set, in the syntax of `--mode`; for readers only, since the engine does not use it.
     Mode(String),
 }
 
 impl Between {
-    /// What a setting does to the engine itself; budgets come with each tick, edits as edits.
+    /// The effect of a setting on the engine itself; budgets are recorded with each tick, edits as edits.
     #[must_use]
     pub fn of(setting: &Setting) -> Option<Self> {
         match setting {
@@ -182,14 +182,14 @@ impl Between {
     }
 }
 
-/// Which tree: of which body, and which of its vertices.
+/// Identifies a tree by its body and the state of the body's vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TreeMark {
     /// Body id.
     pub body: u64,
     /// Its generation.
     pub generation: u32,
-    /// Updates of its vertices until then.
+    /// Number of updates of its vertices until then.
     pub updates: u64,
 }
 
@@ -204,53 +204,53 @@ impl From<TreeOf> for TreeMark {
     }
 }
 
-/// One batch of edits, and what became of it.
+/// One batch of edits, and its outcome.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EditRecord {
-    /// The asker's number.
+    /// The number that the asker gave it.
     pub token: u64,
-    /// What it was made of.
+    /// Where the edits come from.
     pub origin: Origin,
-    /// Done from which scene revision on, or why not.
+    /// The scene revision from which on it holds, or the reason for its refusal.
     pub outcome: Result<Applied, String>,
 }
 
-/// What edits were made of.
+/// Where edits come from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Origin {
     /// A client's request.
     Asked(Asked),
-    /// An operator's margin for all bodies, metres; `None`: as each was put.
+    /// An operator's margin for all bodies, metres; `None`: each body's own as it was put.
     Margin(Option<f64>),
     /// An operator's reset.
     Reset,
 }
 
-/// A request as it came, and the mesh files that were read for it.
+/// A request as received, and the mesh files that were read for it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Asked {
     /// Bytes of JSON at the front of the payload.
     pub json_len: usize,
     /// JSON, then blobs.
     pub payload: Vec<u8>,
-    /// Files by the names that the JSON has.
+    /// Files by their names in the JSON.
     pub files: Contents,
 }
 
 impl TickRecord {
-    /// Takes what the engine was given; edits and what was done before are handed over by others.
+    /// Copies the engine's input, except edits and changes between ticks, which the caller sets.
     pub(super) fn take_input(&mut self, inbox: &Inbox, ask: Ask, now_ns: u64) {
         self.ask = ask;
         self.now_ns = now_ns;
         copy_inbox(inbox, &mut self.inbox);
     }
 
-    /// Takes what was published.
+    /// Copies what was published.
     pub(super) fn take_output(&mut self, out: &Outbox) {
         copy_outbox(out, self.ask.demand, &mut self.out);
     }
 
-    /// Memory of it that is in use without what was asked for with its edits, bytes.
+    /// Memory in use, without the requests and files of its edits, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         let (mut bytes, out) = (size_of::<Self>(), &self.out);
@@ -268,7 +268,7 @@ impl TickRecord {
         bytes + out.body_verdicts.len() + size_of_val(&*out.names) + out.plan.len()
     }
 
-    /// Memory of the requests and files that its edits came with, bytes.
+    /// Memory of the requests and files of its edits, bytes.
     #[must_use]
     pub fn edit_bytes(&self) -> usize {
         let asked = self.edits.iter().map(|edit| match &edit.origin {
@@ -280,7 +280,7 @@ impl TickRecord {
         asked.sum()
     }
 
-    /// Empties it, keeps the memory of what each tick has.
+    /// Clears the input lists and keeps their memory.
     pub(super) fn clear(&mut self) {
         self.between.clear();
         self.edits.clear();
@@ -288,7 +288,7 @@ impl TickRecord {
     }
 }
 
-/// Copies an inbox into another's memory.
+/// Copies an inbox into another one, whose memory is reused.
 fn copy_inbox(from: &Inbox, to: &mut Inbox) {
     to.clear();
     for frame in from.frames() {
@@ -317,7 +317,7 @@ fn copy_inbox(from: &Inbox, to: &mut Inbox) {
     }
 }
 
-/// Copies what somebody listened to into another outbox's memory; the rest is empty there.
+/// Copies the lists that have readers into another outbox, whose memory is reused; the other lists are empty there.
 pub(super) fn copy_outbox(from: &Outbox, demand: Demand, to: &mut Outbox) {
     to.tick = from.tick;
     copy_rows(demand.pairs, &from.pairs, &mut to.pairs);

@@ -1,8 +1,8 @@
-//! By the law: whether what a tick said under a limit of time is borne out by what is found without one.
+//! The law: a replay without a limit of time must confirm what a tick published under such a limit.
 //!
-//! How far a tick came by its deadline depends on the machine, so that no replay says the same. What it said is proved
-//! all the same: a certified verdict must agree, the proved intervals must overlap, and no collision may be missing
-//! where all pairs were told.
+//! How far a tick comes by its deadline depends on the machine, so that no replay publishes the same. What it published
+//! is proved all the same: certified verdicts must agree, proved intervals must overlap, and no collision may be
+//! missing if no pair was left out.
 
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
@@ -10,28 +10,28 @@ use std::collections::BTreeSet;
 use super::differ::Spot;
 use crate::wire::{Demand, MessageHeader, Outbox, PairRow, State, Verdict, pair_flags};
 
-/// What was held against the law so far.
+/// Counts of what was judged by the law so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Judged {
-    /// Recorded rows whose interval or verdict was held against a replayed one.
+    /// Recorded rows whose interval or verdict was compared with the replay.
     pub rows: u64,
-    /// Collisions of the replay that were looked for in the recording.
+    /// Collisions of the replay that were looked up in the recording.
     pub collisions: u64,
-    /// Of these, told as not decided.
+    /// Of these, those that the recording left undecided.
     pub open: u64,
 }
 
-/// The pairs that the replay certified colliding in its tick before: no touch on the way from there is news to it,
-/// while the recording may have left those poses open, and have found the first touch behind a step that jumped.
+/// The pairs that the replay certified as colliding in its previous tick. A sweep from those poses finds no new touch,
+/// while the recording may have left them undecided and have found its first touch after a teleport.
 #[derive(Debug, Default)]
 pub(super) struct Before {
     pairs: BTreeSet<(u64, u64)>,
-    /// Rows were left out: it may be any pair.
+    /// Whether rows were left out: then it may be any pair.
     cut: bool,
 }
 
 impl Before {
-    /// Takes what a replayed tick told, for the next one.
+    /// Stores the pairs of a replayed tick, for the next one.
     pub(super) fn take(&mut self, replayed: &Outbox) {
         let colliding = live(&replayed.pairs).filter(|row| verdict(row) == Verdict::Colliding);
         self.pairs.clear();
@@ -40,7 +40,7 @@ impl Before {
         self.cut = !is_whole(&replayed.pairs_header);
     }
 
-    /// Whether a recorded touch on the way is none that the replay would tell again.
+    /// Whether a recorded touch on the way is one that the replay would not report again.
     fn covers(&self, row: &PairRow) -> bool {
         let on_way = has(row, pair_flags::SWEPT_HIT) && verdict(row) != Verdict::Colliding;
         let known = || self.cut || self.pairs.contains(&(row.body_a, row.body_b));
@@ -48,10 +48,10 @@ impl Before {
     }
 }
 
-/// The first thing that a recorded tick said wrongly.
+/// The first statement of a recorded tick that the law refutes.
 ///
-/// * `demand` - who listened to the recorded one; the replayed one is filled with pairs.
-/// * `before` - what the replay told in the tick before.
+/// * `demand` - readers of the recorded tick; the replayed one always has pairs.
+/// * `before` - the pairs of the replay's previous tick.
 pub(super) fn judge(
     recorded: &Outbox,
     replayed: &Outbox,
@@ -97,12 +97,12 @@ pub(super) fn judge(
     state(recorded, replayed, before)
 }
 
-/// Rows of pairs that are there.
+/// Rows of pairs that still exist.
 fn live(rows: &[PairRow]) -> impl Iterator<Item = &PairRow> {
     rows.iter().filter(|row| !has(row, pair_flags::GONE))
 }
 
-/// Which of two rows comes first; `None`: both are at their end.
+/// Which of two rows comes first; `None`: both lists are at their end.
 fn order(one: Option<&PairRow>, two: Option<&PairRow>) -> Option<Ordering> {
     let key = |row: &PairRow| (row.body_a, row.body_b);
     match (one, two) {
@@ -113,7 +113,7 @@ fn order(one: Option<&PairRow>, two: Option<&PairRow>) -> Option<Ordering> {
     }
 }
 
-/// Whether absence of a row says that the pair is apart.
+/// Whether a missing row means that the pair is apart.
 fn is_whole(header: &MessageHeader) -> bool {
     header.truncated == 0
 }
@@ -130,12 +130,12 @@ fn touches(row: &PairRow) -> bool {
     verdict(row) == Verdict::Colliding || has(row, pair_flags::SWEPT_HIT)
 }
 
-/// Whether 0 is within the rounding: then either certificate may be had.
+/// Whether the gap is 0 within rounding: then either verdict is right.
 fn is_touch(row: &PairRow) -> bool {
     has(row, pair_flags::TOUCHING)
 }
 
-/// A touch within rounding, and none on the way.
+/// A touch within rounding, without a touch on the way.
 fn only_touches(row: &PairRow) -> bool {
     is_touch(row) && !has(row, pair_flags::SWEPT_HIT)
 }
@@ -144,7 +144,7 @@ fn is_apart(row: &PairRow) -> bool {
     matches!(verdict(row), Verdict::Apart | Verdict::Near)
 }
 
-/// A pair that both tell of.
+/// Judges a pair that both ticks report.
 fn both(one: &PairRow, two: &PairRow, before: &Before, judged: &mut Judged) -> Option<Spot> {
     judged.rows += 1;
     if touches(two) {
@@ -165,14 +165,14 @@ fn both(one: &PairRow, two: &PairRow, before: &Before, judged: &mut Judged) -> O
     swept(one, two, before)
 }
 
-/// What is said of the way to this tick's poses.
+/// Judges what the rows say of the way to this tick's poses.
 fn swept(one: &PairRow, two: &PairRow, before: &Before) -> Option<Spot> {
     let (hit, open) = (pair_flags::SWEPT_HIT, pair_flags::SWEPT_OPEN);
-    // Decided in the replay, and said otherwise in the recording. Who collides now has touched: that it did so on the
-    // way is no news where it collided before, which one may have certified a tick earlier than the other.
+    // Decided in the replay and contradicted by the recording. A pair that collides now has touched. A touch on the way
+    // contradicts nothing if the pair collided before, which one side may have certified a tick before the other.
     let denied = has(two, hit) && !touches(one) && !has(one, open);
     let invented = has(one, hit) && !before.covers(one) && !touches(two) && !has(two, open);
-    // A step that jumped was not asked: it may have touched there before.
+    // A teleported step is not swept: the pair may have touched in it.
     let later = |one: &PairRow, two: &PairRow| {
         one.toi_min > two.toi_max && !has(one, pair_flags::TELEPORTED)
     };
@@ -185,25 +185,25 @@ fn swept(one: &PairRow, two: &PairRow, before: &Before) -> Option<Spot> {
     (denied || invented || apart).then(|| spot(one, "way", &show(one), &show(two)))
 }
 
-/// Whether it touched at the poses that its way begins with: the tick before may have certified that in the replay, and
-/// have left it open in the recording.
+/// Whether a touch is at the poses that the way begins with: the replay may have certified it in the previous tick,
+/// which the recording left undecided.
 fn is_of_before(row: &PairRow) -> bool {
     has(row, pair_flags::SWEPT_HIT) && row.toi_max <= 0.0 && verdict(row) != Verdict::Colliding
 }
 
-/// A pair that the recording alone tells of: the replay proved it apart, and not near.
+/// Judges a pair that only the recording reports: the replay proved it apart, and not near.
 fn alone(one: &PairRow, before: &Before) -> Option<Spot> {
     let wrong = (touches(one) && !before.covers(one)) || one.gap_max_m <= 0.0;
     let wrong = wrong && !is_touch(one);
     wrong.then(|| spot(one, "verdict", &words(one), "no row: apart"))
 }
 
-/// What was said in one word.
+/// Judges the states of the two ticks.
 fn state(recorded: &Outbox, replayed: &Outbox, before: &Before) -> Option<Spot> {
     let word = |out: &Outbox| State::from_code(out.tick.header.state);
     let (one, two) = (word(recorded)?, word(replayed)?);
     let is_safe = |state: State| matches!(state, State::Clear | State::Near);
-    // By touches within rounding alone either word may be had.
+    // If all touches are within rounding, either state is right.
     let by_touches = |out: &Outbox, is_of_before: &dyn Fn(&PairRow) -> bool| {
         let news = |row: &&PairRow| touches(row) && !is_of_before(row);
         let mut touching = live(&out.pairs).filter(news).peekable();

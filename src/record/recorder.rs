@@ -1,9 +1,9 @@
-//! The recorder: the tick's thread copies a tick into memory that goes round, another thread writes it.
+//! The recorder: the tick's thread copies each tick into reused memory, another thread writes it.
 //!
-//! In: what the engine was given and what it said, after each tick. Out: records for a [`Sink`], in order. The tick's
-//! thread copies rows and no more: it makes no system call, waits for nobody, and allocates only while records grow.
-//! What it takes counts as sending, so it is kept back from the budget. Where the sink cannot follow, what is only for
-//! people is left out; where that is not enough, the recording ends, is told once, and the daemon goes on.
+//! In: the engine's input and output, after each tick. Out: records for a [`Sink`], in order. The tick's thread only
+//! copies rows: it makes no system call, waits for no thread, and allocates only while records grow. Its time counts as
+//! sending, so it is kept back from the budget. If the sink is too slow, messages for viewers are left out; if that is
+//! not enough, the recording ends, which is logged once, and the daemon goes on.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError};
@@ -17,40 +17,40 @@ use crate::tick::Engine;
 use crate::time::{Clock as _, SystemClock};
 use crate::wire::{Demand, Inbox};
 
-/// How often the writer looks for records: nobody wakes it, for a wake-up would cost the tick a system call.
+/// How often the writer polls for records. No tick wakes it, since a wake-up would cost the tick a system call.
 const LOOK: Duration = Duration::from_millis(20);
-/// Time between two flushes of a recording at most, nanoseconds: what a killed process loses.
+/// Longest time between two flushes of a recording, nanoseconds: a killed process loses that much.
 pub const FLUSH_NS: u64 = 500_000_000;
-/// Records kept for their memory: more than come between two looks at 1 kHz.
+/// Records kept for their memory: more than come between two polls at 1 kHz.
 const SPARE_MAX: usize = 32;
-/// Time between two ticks whose bodies are asked for only to be recorded, nanoseconds: for those who look at the file,
-/// for a replay has them all.
+/// Time between two ticks whose bodies are computed only for the recording, nanoseconds. Only viewers need them, since
+/// a replay computes all of them.
 const BODIES_NS: u64 = 100_000_000;
 
-/// Where records go.
+/// The destination of records.
 pub trait Sink: Send {
     /// Writes one tick.
     ///
-    /// * `hurried` - much waits: what a replay does not need is to be left out.
+    /// * `hurried` - many records wait: what a replay does not need is to be left out.
     ///
     /// # Errors
-    /// What failed, and what to change; the recording is over then.
+    /// The failure, and what to change; the recording is over then.
     fn tick(&mut self, record: &TickRecord, hurried: bool) -> Result<()>;
 
-    /// Hands over what was written: it survives the end of this process.
+    /// Flushes what was written, which then survives the end of this process.
     ///
     /// # Errors
     /// As [`Sink::tick`].
     fn flush(&mut self) -> Result<()>;
 
-    /// The last that is written: why nothing follows; empty: all was recorded.
+    /// Writes the last record: the reason for the end; empty: all was recorded.
     ///
     /// # Errors
     /// As [`Sink::tick`].
     fn end(&mut self, why: &str) -> Result<()>;
 }
 
-/// What both threads share.
+/// State shared by both threads.
 struct Desk {
     state: Mutex<State>,
     wake: Condvar,
@@ -58,7 +58,7 @@ struct Desk {
 
 #[derive(Default)]
 struct State {
-    /// Records to be written, what they take, and what their edits came with.
+    /// Records to be written, their bytes, and the bytes of their edits' requests and files.
     waiting: VecDeque<Box<TickRecord>>,
     bytes: usize,
     edit_bytes: usize,
@@ -67,9 +67,9 @@ struct State {
         reason = "they go from list to list, and each is kilobytes by itself"
     )]
     spare: Vec<Box<TickRecord>>,
-    /// Nothing follows, and why; empty: the daemon ended.
+    /// Nothing follows, for this reason; empty: the daemon ended.
     ending: Option<String>,
-    /// The sink failed: nothing more is taken.
+    /// The sink failed: it takes no more records.
     failed: Option<Error>,
 }
 
@@ -78,7 +78,7 @@ impl Desk {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// `None`: the other thread has it. It may have been put to sleep with it, for which no tick waits.
+    /// `None`: the other thread holds the lock. That thread may be suspended meanwhile, for which no tick waits.
     fn try_lock(&self) -> Option<MutexGuard<'_, State>> {
         match self.state.try_lock() {
             Ok(state) => Some(state),
@@ -94,11 +94,11 @@ pub struct Recorder {
     writer: Option<JoinHandle<()>>,
     /// Memory for the next record.
     spare: Option<Box<TickRecord>>,
-    /// Records that could not be put on the desk yet.
+    /// Records that could not be handed to the writer yet.
     held: VecDeque<Box<TickRecord>>,
     between: Vec<Between>,
     origins: Vec<Origin>,
-    /// When bodies were last asked for, nanoseconds of `CLOCK_BOOTTIME`.
+    /// Time of the last tick with bodies, nanoseconds of `CLOCK_BOOTTIME`.
     bodies_ns: u64,
     over: bool,
 }
@@ -112,10 +112,10 @@ impl std::fmt::Debug for Recorder {
 }
 
 impl Recorder {
-    /// A recording that goes to `sink`, whose start is written already.
+    /// Starts a recording to `sink`, which has written its start already.
     ///
     /// # Errors
-    /// `Error::Io` when the writer's thread cannot be started.
+    /// `Error::Io` if the writer's thread cannot be started.
     pub fn start(sink: Box<dyn Sink>) -> Result<Self> {
         let desk = Arc::new(Desk {
             state: Mutex::default(),
@@ -138,7 +138,7 @@ impl Recorder {
         })
     }
 
-    /// Who listens, this recording with them: to pairs and contacts, and now and then to bodies.
+    /// The readers including this recording, which reads pairs and contacts, and bodies once per `BODIES_NS`.
     pub fn listen(&mut self, mut demand: Demand, now_ns: u64) -> Demand {
         if self.over {
             return demand;
@@ -154,14 +154,14 @@ impl Recorder {
         demand
     }
 
-    /// Something was done to the engine, before the next tick.
+    /// Records a change of the engine before the next tick.
     pub fn note(&mut self, between: Between) {
         if !self.over {
             self.between.push(between);
         }
     }
 
-    /// What the next batch of the next tick's edits was made of; given back when the recording is over.
+    /// Records the origin of the next tick's next batch of edits; returns it if the recording is over.
     pub fn note_edit(&mut self, origin: Origin) -> Option<Origin> {
         if self.over {
             return Some(origin);
@@ -170,7 +170,7 @@ impl Recorder {
         None
     }
 
-    /// Records a tick: what the engine was given for it, and what it said.
+    /// Records a tick: the engine's input and output.
     pub fn tick(&mut self, inbox: &Inbox, ask: Ask, engine: &Engine) {
         if self.over {
             return;
@@ -196,7 +196,7 @@ impl Recorder {
         }
     }
 
-    /// Puts what is held on the desk, and takes memory for the next record from there.
+    /// Hands the held records to the writer, and takes memory for the next record.
     fn hand_over(&mut self, state: &mut State) {
         self.spare = state.spare.pop();
         while let Some(record) = self.held.pop_front() {
@@ -229,10 +229,11 @@ impl Recorder {
         }
     }
 
-    /// Writes what waits and ends the recording, as it was meant to; one that is dropped instead says that it was not.
+    /// Writes all waiting records and ends the recording normally; a recorder that is dropped instead records a
+    /// breakdown.
     ///
     /// # Errors
-    /// What failed, where the recording is not whole; it was told in the log already.
+    /// The failure of the sink that ended the recording; it was logged already. A slow disk is no error here.
     pub fn finish(mut self) -> Result<()> {
         self.close("");
         match self.desk.lock().failed.take() {
@@ -255,7 +256,7 @@ impl Recorder {
 }
 
 impl Drop for Recorder {
-    /// Nobody said that this is the end.
+    /// Ends the recording with a breakdown: `finish` was not called.
     fn drop(&mut self) {
         self.close("the daemon broke down: its log says why");
     }
@@ -291,7 +292,8 @@ fn write_all(desk: &Desk, sink: &mut dyn Sink) -> Result<()> {
             sink.tick(&record, hurried)?;
             is_dirty = true;
             let (bytes, edit_bytes) = (record.bytes(), record.edit_bytes());
-            // Requests are large and seldom: their memory is given back here, and not where a tick waits for it.
+            // Requests are large and rare: their memory is freed here, without the lock, for which a tick would have to
+            // wait.
             record.edits.clear();
             let mut state = desk.lock();
             state.bytes = state.bytes.saturating_sub(bytes);

@@ -1,8 +1,8 @@
-//! Replay: the same engine on what was recorded, with a clock that shows the recorded times.
+//! Replay: runs the same engine on recorded input, with a clock that shows the recorded times.
 //!
-//! In: a [`Start`], then each [`TickRecord`] in order. Out: the first [`Difference`], or none. Up to the first tick
-//! that was limited by time everything must be equal bit by bit ([`super::differ`]); from there on the replay has no
-//! limit, and what was recorded is held against the law ([`super::law`]).
+//! In: a [`Start`], then each [`TickRecord`] in order. Out: the first [`Difference`], or none. Before the first tick
+//! that was limited by time everything must be equal bit by bit ([`super::differ`]). From that tick on the replay has
+//! no limit, and the recording is judged by the law ([`super::law`]).
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -25,17 +25,17 @@ use crate::world::{Edit, WornTree};
 /// Where a replay first differs from its recording.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Difference {
-    /// Which tick.
+    /// Number of the tick.
     pub tick: u64,
-    /// Which message, and which of its rows.
+    /// The message, and its row.
     pub place: String,
     /// Bodies of that row, by name.
     pub bodies: Vec<String>,
-    /// Which field of the row; empty: the row itself.
+    /// The field of the row; empty: the row itself.
     pub field: String,
-    /// What was recorded.
+    /// The recorded value.
     pub recorded: String,
-    /// What was replayed.
+    /// The replayed value.
     pub replayed: String,
 }
 
@@ -56,18 +56,18 @@ impl std::fmt::Display for Difference {
     }
 }
 
-/// What was compared so far.
+/// Counts of what was compared so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Ticks compared bit by bit.
     pub exact: u64,
-    /// Ticks held against the law.
+    /// Ticks judged by the law.
     pub lawful: u64,
-    /// What was held against it.
+    /// What was judged in them.
     pub judged: Judged,
 }
 
-/// The clock of a replay: it stands still within a tick.
+/// The clock of a replay, which stands still within a tick.
 #[derive(Debug, Default)]
 struct Shown {
     boottime_ns: AtomicU64,
@@ -88,20 +88,20 @@ impl Clock for Shown {
     }
 }
 
-/// A replay under way.
+/// A replay in progress.
 pub struct Replay {
     engine: Engine,
     clock: Arc<Shown>,
     edits: EditBuilder,
-    /// The tree that the worker was handed.
+    /// The tree that the worker got.
     worn: Option<WornTree>,
-    /// Names of all bodies that ever were.
+    /// Names of all bodies that ever existed.
     names: BTreeMap<u64, String>,
-    /// What the replay said of what was listened to.
+    /// The replay's output, only lists that had readers in the recording.
     said: Outbox,
-    /// A tick was limited by time: from then on by the law.
+    /// Whether a tick was limited by time: from then on the law applies.
     lawful: bool,
-    /// What the replay certified in its last tick.
+    /// The pairs that the replay certified in its last tick.
     before: Before,
     tally: Tally,
 }
@@ -115,10 +115,10 @@ impl std::fmt::Debug for Replay {
 }
 
 impl Replay {
-    /// The engine as it was before the first tick.
+    /// Builds the engine as it was before the first tick.
     ///
     /// # Errors
-    /// `Error::Scene` when the recorded scene cannot be built again.
+    /// `Error::Scene` if the recorded scene cannot be built again; `Error::Refused` if the recorded mode is invalid.
     pub fn new(start: &Start) -> Result<Self> {
         let facts = &start.facts;
         let mut scene = Scene::parse_kept(&start.scene, &facts.scene_file)?;
@@ -147,13 +147,13 @@ impl Replay {
         })
     }
 
-    /// What was compared so far.
+    /// Counts of what was compared so far.
     #[must_use]
     pub fn tally(&self) -> Tally {
         self.tally
     }
 
-    /// The engine, for a look at its state.
+    /// The engine, to inspect its state.
     #[must_use]
     pub fn engine(&self) -> &Engine {
         &self.engine
@@ -161,13 +161,13 @@ impl Replay {
 
     /// Runs the next tick and compares it.
     ///
-    /// * `record` - that of the tick behind the last one, as a [`Reader`](super::file::Reader) yields them; is changed:
-    ///   by the law deadlines are taken out of its frames.
-    /// * `compared` - whether it is to be compared; each tick must be run.
-    /// * returns - the first difference, after which a replay has no more to say.
+    /// * `record` - the tick after the last one, as a [`Reader`](super::file::Reader) yields it. It is changed: files
+    ///   of edits are moved out, and by the law deadlines are taken out of its frames.
+    /// * `compared` - whether the tick is compared; each tick must be run.
+    /// * returns - the first difference, after which the replay is over.
     ///
     /// # Errors
-    /// `Error::Refused` when an edit cannot be read.
+    /// `Error::Refused` if a recorded edit cannot be built again.
     pub fn tick(&mut self, record: &mut TickRecord, compared: bool) -> Result<Option<Difference>> {
         let tick = record.out.tick.header.tick;
         self.lawful |= is_timed(&record.out.tick);
@@ -191,7 +191,7 @@ impl Replay {
         Ok(spot.map(|spot| self.difference(tick, spot)))
     }
 
-    /// The tick itself.
+    /// Runs the tick.
     fn run(&mut self, record: &mut TickRecord, edits: &[EditBatch]) {
         let mut ask = record.ask;
         if self.lawful {
@@ -237,8 +237,8 @@ impl Replay {
         edit.or_else(|| differ::first(&record.out, &self.said, demand))
     }
 
-    /// Does what was done between two ticks; whatever cannot be done again is a difference. By the law none is: which
-    /// tree wears, and when, follows from refits that were cut off by time.
+    /// Repeats a change between two ticks; one that cannot be repeated is a difference. By the law it is none: which
+    /// tree is worn, and when, follows from refits that were cut off by time.
     fn do_between(&mut self, between: &Between) -> Option<Spot> {
         let told = |done: &str| Some(Spot::whole("between ticks", &format!("{between:?}"), done));
         match between {
@@ -280,7 +280,7 @@ impl Replay {
         }
     }
 
-    /// Edits as they were made, with shapes built again.
+    /// The edits as they were made, with shapes built again.
     fn read_edits(&mut self, edits: &mut [EditRecord]) -> Result<Vec<EditBatch>> {
         let read = |edit: &mut EditRecord| self.read_edit(edit);
         edits.iter_mut().map(read).collect()
@@ -332,7 +332,7 @@ impl Replay {
     }
 }
 
-/// Whether a tick was limited by time, the budget's or a frame's: what it found then depends on the machine.
+/// Whether a tick was limited by time, of the budget or of a frame: its results then depend on the machine.
 fn is_timed(row: &TickRow) -> bool {
     row.budget_ns != u64::MAX
 }

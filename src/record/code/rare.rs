@@ -1,4 +1,4 @@
-//! What few ticks have: edits with their files, settings, trees.
+//! The parts that few ticks have: edits with their files, settings, trees.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Bit by bit there and back; and what is cut off or changed is refused, without a panic.
+//! Round trips are exact to the bit, and truncated or changed bytes cause no panic.
 
 use super::*;
 use crate::record::given::{Asked, Between, EditRecord, Origin, TreeMark};
@@ -6,7 +6,7 @@ use crate::shape::Contents;
 use crate::wire::{PairRow, TransformRow, VertexHeader, name_bytes};
 use crate::world::Applied;
 
-/// Numbers that lose something where they are not copied as bits.
+/// Floats that change unless their bits are copied.
 const ODD: [u64; 5] = [
     0x7ff8_0000_0000_1234,
     0xfff0_0000_0000_0001,
@@ -108,7 +108,7 @@ fn fill_inbox(inbox: &mut Inbox) {
     frame.since_ns = vec![7];
     (frame.first_seq, frame.cut) = (u64::MAX - 1, true);
     frame.refused_bodies = vec![(8, RejectReason::BadChain)];
-    // One without anything.
+    // A frame without rows.
     inbox.push();
     let vertices = inbox.push_vertices();
     vertices.header = VertexHeader {

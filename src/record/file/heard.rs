@@ -1,4 +1,4 @@
-//! What a client heard of a daemon is written: for people alone, and nothing that could be replayed.
+//! Writes what a client received from a daemon: for viewers only, since it cannot be replayed.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use super::{MISSED, WHY};
 use crate::error::Result;
 use crate::wire::{PairRow, TickRow};
 
-/// Writes what was heard as MCAP.
+/// Writes received ticks as MCAP.
 #[derive(Debug)]
 pub struct McapLog<W: Medium> {
     tape: Tape<W>,
@@ -18,14 +18,14 @@ pub struct McapLog<W: Medium> {
 }
 
 impl<W: Medium> McapLog<W> {
-    /// A file without ticks.
+    /// Begins a file without ticks.
     ///
-    /// * `name` - what messages call the file.
+    /// * `name` - name of the file in messages.
     /// * `frame_id` - the scene's frame.
-    /// * `since_1970_ns` - what `CLOCK_BOOTTIME` is behind the time of day, nanoseconds.
+    /// * `since_1970_ns` - what to add to a time of `CLOCK_BOOTTIME` for the time since 1970, nanoseconds.
     ///
     /// # Errors
-    /// `Error::Io` when it cannot be written.
+    /// `Error::Io` if it cannot be written.
     pub fn new(to: W, name: &str, frame_id: &str, since_1970_ns: u64) -> Result<Self> {
         let mut log = Self {
             tape: Tape::new(to, name, shown::TOPICS.into_iter())?,
@@ -38,7 +38,7 @@ impl<W: Medium> McapLog<W> {
 
     /// Writes a tick.
     ///
-    /// * `has_ended` - whether this is the whole of it: a long tick is told of more than once.
+    /// * `has_ended` - whether the tick is complete: a long tick is received more than once.
     ///
     /// # Errors
     /// As [`McapLog::new`].
@@ -51,15 +51,15 @@ impl<W: Medium> McapLog<W> {
         self.show.tick(&mut self.tape, time_ns, shown.tick)
     }
 
-    /// How many ticks that have ended the file has.
+    /// Number of complete ticks in the file.
     #[must_use]
     pub fn ticks(&self) -> u64 {
         self.tape.ticks()
     }
 
-    /// The daemon has started anew: writes the ends that it means for pairs of the boot that is over.
+    /// Writes the ends that a restart of the daemon implies for pairs of the previous boot.
     ///
-    /// * `last` - the newest tick of it.
+    /// * `last` - newest tick of the previous boot.
     ///
     /// # Errors
     /// As [`McapLog::new`].
@@ -73,7 +73,7 @@ impl<W: Medium> McapLog<W> {
         Ok(())
     }
 
-    /// Hands over what was written: it survives the end of this process.
+    /// Flushes what was written, which then survives the end of this process.
     ///
     /// # Errors
     /// As [`McapLog::new`].
@@ -81,10 +81,10 @@ impl<W: Medium> McapLog<W> {
         self.tape.flush()
     }
 
-    /// Closes the file; one that could not be written was closed then.
+    /// Closes the file. A file that could not be written was closed then.
     ///
-    /// * `missed` - ticks that were overtaken and are not in it.
-    /// * `why` - nothing follows; empty: it was meant to end.
+    /// * `missed` - number of ticks that newer ones overtook, so that the file lacks them.
+    /// * `why` - reason for the end; empty: the end was requested.
     ///
     /// # Errors
     /// As [`McapLog::new`].

@@ -1,23 +1,23 @@
-//! What a recording is written to: how much of it has arrived, and how what has not is taken back.
+//! The destination of a recording: counts the bytes that it took, and can take back the last ones.
 
 use std::fs::File;
 use std::io::{BufWriter, Result, Seek, SeekFrom, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Bytes that are collected for one call of the system.
+/// Bytes collected for one system call.
 const BUFFER_BYTES: usize = 1 << 16;
 
-/// What a recording is written to, from its front.
+/// The destination of a recording, which is written from its start.
 pub trait Medium: Write + Seek + Sized {
-    /// Takes back all behind the first `bytes`, and what waits to be written; what is written next follows them.
+    /// Discards everything after the first `bytes`, and all buffered data; the next write continues there.
     ///
     /// # Errors
-    /// Of a medium that takes nothing back, as a pipe.
+    /// If the medium cannot be truncated, such as a pipe.
     fn cut(self, bytes: u64) -> Result<Self>;
 }
 
-/// An open file for a recording: what is written is collected for few calls of the system.
+/// An open file for a recording, buffered to make few system calls.
 #[must_use]
 pub fn buffered(file: File) -> BufWriter<File> {
     BufWriter::with_capacity(BUFFER_BYTES, file)
@@ -38,14 +38,14 @@ impl Medium for BufWriter<File> {
     }
 }
 
-/// A medium and how many bytes it took.
+/// A medium, and the number of bytes that it took.
 pub(super) struct Counted<W> {
     medium: W,
     bytes: Arc<AtomicU64>,
 }
 
 impl<W: Medium> Counted<W> {
-    /// Returns it and the count, to be read while another has the medium.
+    /// Returns the medium and its count, which can be read while another object owns the medium.
     pub(super) fn new(medium: W) -> (Self, Arc<AtomicU64>) {
         let bytes = Arc::default();
         let counted = Self {
@@ -55,7 +55,7 @@ impl<W: Medium> Counted<W> {
         (counted, bytes)
     }
 
-    /// As [`Medium::cut`]; nothing is counted any more.
+    /// As [`Medium::cut`]; ends the count.
     pub(super) fn cut(self, bytes: u64) -> Result<W> {
         self.medium.cut(bytes)
     }

@@ -1,8 +1,8 @@
-//! Recordings as MCAP files (mcap.dev), profile `ros2`: every topic is CDR with a `ros2msg` schema, ours too, for
-//! `ros2 bag` opens no file whose topics are of several encodings; a reader that does not know ours passes over them.
+//! Recordings as MCAP files (mcap.dev), profile `ros2`. Every topic is CDR with a `ros2msg` schema, our own ones too,
+//! because `ros2 bag` opens no file with topics of several encodings. A reader that does not know our types skips them.
 //!
-//! Chunks are not compressed. Of a pool of 1,000 bodies lz4 saves two fifths and zstd three; each is a library in C,
-//! the first of this program, and can be had afterwards for keeping (`mcap compress`).
+//! Chunks are not compressed. For a pool of 1,000 bodies lz4 saves two fifths and zstd three, but each is a C library,
+//! the first of this program, and a file can be compressed later to keep it (`mcap compress`).
 
 mod heard;
 mod medium;
@@ -18,19 +18,19 @@ pub use read::{Ending, Read, Reader};
 pub use shown::Shown;
 pub use write::McapSink;
 
-/// Topics of our own: the start, then what went in and what came out, bit by bit.
+/// Our own topics: the start, then the input and the output of each tick, exact to the bit.
 const START: &str = "/sweepd/record/start";
 const INPUT: &str = "/sweepd/record/input";
 const OUTPUT: &str = "/sweepd/record/output";
-/// The last record: why nothing follows.
+/// Name of the last record, which holds the reason for the end.
 const END: &str = "sweepd.end";
-/// Its keys: that; how many ticks came before it; of how many nothing is there for people; how many were overtaken
-/// before they were heard.
+/// Its keys: the reason; the number of ticks; the number of ticks without messages for viewers; the number of ticks
+/// that newer ones overtook before the client received them.
 const WHY: &str = "why";
 const TICKS: &str = "ticks";
 const NOT_SHOWN: &str = "ticks_without_messages";
 const MISSED: &str = "ticks_missed";
-/// What CDR begins with: little-endian, no options.
+/// The header of CDR data: little-endian, no options.
 const CDR_HEAD: [u8; 4] = [0, 1, 0, 0];
 
 #[cfg(test)]

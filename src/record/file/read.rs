@@ -1,5 +1,5 @@
-//! A recording is read, from the front and once: a file that ends in the middle, as a killed daemon leaves it, is read
-//! as far as it goes.
+//! Reads a recording once, from its start. A file that ends in the middle, as a killed daemon leaves it, is read up to
+//! there.
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -17,24 +17,24 @@ use crate::record::bytes::Damaged;
 use crate::record::code::{start_of, take_input, take_output};
 use crate::record::{Start, TickRecord};
 
-/// Most that is read at once, bytes, whatever length a record claims: memory grows only with what is there.
+/// Most bytes of one read, whatever length a record claims: memory grows only with the data that exists.
 const READ_BYTES_MAX: usize = 1 << 20;
-/// Longest record there can be, bytes: a message tells its length in 32 bits, and a chunk ends with the one that fills
-/// it. What claims to be longer is damaged.
+/// Longest possible record, bytes: the length of a message has 32 bits, and a chunk ends with the message that fills
+/// it. A longer claim means damage.
 const RECORD_BYTES_MAX: usize = (1 << 32) + (1 << 22);
-/// What an MCAP file begins and, once it is closed, ends with.
+/// First bytes of an MCAP file, and last bytes of a closed one.
 const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
 
 /// How a recording ends.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// As it was meant to.
+    /// As intended.
     Whole,
-    /// Early, and it says why.
+    /// Early, with the reason.
     Early(String),
     /// In the middle: the recorder was killed, or the file was cut off.
     Cut,
-    /// What follows is damaged, and how.
+    /// In damaged data, with the error.
     Damaged(String),
 }
 
@@ -49,16 +49,16 @@ impl Display for Ending {
     }
 }
 
-/// What comes next in a recording.
+/// The next part of a recording.
 #[derive(Debug)]
 pub enum Read<'a> {
     /// A tick.
     Tick(&'a mut TickRecord),
-    /// Nothing.
+    /// The end.
     End(Ending),
 }
 
-/// A recording that is read.
+/// Reads a recording.
 pub struct Reader {
     file: File,
     name: String,
@@ -68,20 +68,20 @@ pub struct Reader {
     topics: BTreeMap<u16, String>,
     start: Option<Start>,
     record: TickRecord,
-    /// The tick whose input was read, and whose output is next.
+    /// The tick whose input was read, and whose output comes next.
     open: Option<u64>,
-    /// Ticks that were read; a recording has all from the first on.
+    /// Number of ticks read; a recording has all ticks from the first on.
     ticks: u64,
-    /// The file was closed: no record of it ends beyond its end.
+    /// Whether the file was closed: then no record may extend beyond its end.
     is_closed: bool,
-    /// Which program wrote it.
+    /// The program that wrote it.
     library: String,
     note: Option<Note>,
-    /// How its chunks are compressed; ours are not.
+    /// How its chunks are compressed, which ours are not.
     compressed: Option<String>,
 }
 
-/// What the last record says.
+/// Content of the last record.
 struct Note {
     why: String,
     ticks: Option<u64>,
@@ -95,7 +95,7 @@ impl std::fmt::Debug for Reader {
     }
 }
 
-/// What a record of the file was.
+/// Kind of a record.
 enum Step {
     Start,
     Tick,
@@ -106,8 +106,8 @@ impl Reader {
     /// Opens a recording; returns it with its start.
     ///
     /// # Errors
-    /// `Error::Usage` when it cannot be opened, is no MCAP file or none of ours, `Error::Refused` when it is of another
-    /// version, `Error::Io` when it cannot be read.
+    /// `Error::Usage` if it cannot be opened, or is no recording of ours; `Error::Refused` if it is of another version,
+    /// or its start is damaged; `Error::Io` if it cannot be read.
     pub fn open(path: &Path) -> Result<(Self, Start)> {
         let name = path.display().to_string();
         let unreadable = |e| Error::io(format!("cannot read the recording {name}"), e);
@@ -163,16 +163,16 @@ impl Reader {
         Ok((reader, start))
     }
 
-    /// How much of the file was read, and how long it is, bytes.
+    /// Number of bytes read, and length of the file, bytes.
     #[must_use]
     pub fn progress(&self) -> (u64, u64) {
         (self.read_bytes, self.bytes)
     }
 
-    /// The next tick.
+    /// Reads the next tick.
     ///
     /// # Errors
-    /// `Error::Io` when the file cannot be read.
+    /// `Error::Io` if the file cannot be read.
     pub fn next_tick(&mut self) -> Result<Read<'_>> {
         loop {
             match self.step()? {
@@ -183,7 +183,7 @@ impl Reader {
         }
     }
 
-    /// One record of the file; an error of the inner kind is its end.
+    /// Reads one record; the inner error is the end of the recording.
     fn step(&mut self) -> Result<std::result::Result<Step, Ending>> {
         loop {
             let event = match self.mcap.next_event() {
@@ -269,7 +269,7 @@ impl Reader {
         Ok(Ok(Step::Other))
     }
 
-    /// Whether the tick that was read follows the one before it.
+    /// Checks that the tick read follows the one before it.
     fn next_is_there(&mut self) -> std::result::Result<Step, Ending> {
         let (tick, next) = (self.record.out.tick.header.tick, self.ticks + 1);
         if tick != next {
@@ -280,7 +280,7 @@ impl Reader {
         Ok(Step::Tick)
     }
 
-    /// How a file ends that was closed.
+    /// The ending of a file that was closed.
     fn ending(&mut self) -> Ending {
         let Some(note) = self.note.take() else {
             if !self.has_start() {
@@ -299,12 +299,12 @@ impl Reader {
         }
     }
 
-    /// Whether it is a recording: it has a topic for a start.
+    /// Whether the file is a recording of ours: it has a topic for the start.
     fn has_start(&self) -> bool {
         self.topics.values().any(|topic| topic == START)
     }
 
-    /// Why a file is refused that ends before a start was read.
+    /// The refusal of a file that ends before its start was read.
     fn no_start(&self, ending: &Ending) -> Error {
         let ours = self.library.starts_with("sweepd/");
         let ours = ours && (self.topics.is_empty() || self.has_start());
@@ -344,10 +344,10 @@ impl Reader {
     }
 }
 
-/// Whether a file ends as one does that was closed; it is at its front again.
+/// Whether a file ends as a closed one does. The file is rewound.
 fn is_closed(file: &mut File, bytes: u64) -> std::io::Result<bool> {
     let mut tail = [0; MAGIC.len()];
-    // The front has the same.
+    // The mark at the start of the file must not count as the one at its end.
     if bytes < 2 * tail.len() as u64 {
         return Ok(false);
     }
@@ -357,7 +357,7 @@ fn is_closed(file: &mut File, bytes: u64) -> std::io::Result<bool> {
     Ok(tail == *MAGIC)
 }
 
-/// The bytes of `uint8[] data` in CDR.
+/// The payload of `uint8[] data` in CDR; `None`: it is truncated.
 fn payload(message: &[u8]) -> Option<&[u8]> {
     let (head, data) = message.split_at_checked(8)?;
     let len = u32::from_le_bytes(head.get(4..8)?.try_into().ok()?);

@@ -1,4 +1,4 @@
-//! The types of a recording's topics, as `ros2msg` schemas: the interface file, then each that it names.
+//! The types of a recording's topics as `ros2msg` schemas: the interface file, then that of each type used in it.
 
 /// A type and its interface file.
 struct Interface(&'static str, &'static str);
@@ -12,7 +12,7 @@ macro_rules! ours {
     };
 }
 
-/// Everything that a schema may name. The common ones without their comments.
+/// All interfaces that a schema may use. Those of common packages have no comments.
 const INTERFACES: &[Interface] = &[
     ours!("BodyTransform"),
     ours!("BodyTransforms"),
@@ -65,11 +65,11 @@ const INTERFACES: &[Interface] = &[
     ),
 ];
 
-/// The line between two interfaces of a schema.
+/// The line that separates two interfaces of a schema.
 const RULE: &str =
     "================================================================================";
 
-/// The schema of a type; empty where there is none.
+/// The schema of a type; empty if the type is unknown.
 pub(super) fn schema(name: &str) -> String {
     let Some(Interface(_, text)) = find(name) else {
         return String::new();
@@ -97,7 +97,7 @@ fn find(name: &str) -> Option<&'static Interface> {
     INTERFACES.iter().find(|Interface(own, _)| *own == name)
 }
 
-/// Whether a field of `owner`'s interface is of type `other`; within a package the package may be left out.
+/// Whether a field in `owner`'s interface has type `other`; within a package the package name may be left out.
 fn names(owner: &str, text: &str, other: &str) -> bool {
     let long = other.replace("/msg/", "/");
     let (package, short) = other.split_once("/msg/").unwrap_or_default();

@@ -1,4 +1,4 @@
-//! A tick as people look at it: ROS 2 messages, names beside ids.
+//! A tick as ROS 2 messages for viewers, with names beside ids.
 
 use super::medium::Medium;
 use super::tape::Tape;
@@ -13,7 +13,7 @@ const PAIRS: &str = "/sweepd/pairs";
 const STATE: &str = "/sweepd/state";
 const TICK: &str = "/sweepd/tick";
 
-/// Topics and their types. Names come before what names them.
+/// Topics and their types. Names come before the messages that need them.
 pub(super) const TOPICS: [(&str, &str); 6] = [
     (NAMES, "sweepd_msgs/msg/Names"),
     (BODIES, "sweepd_msgs/msg/BodyTransforms"),
@@ -23,12 +23,12 @@ pub(super) const TOPICS: [(&str, &str); 6] = [
     (TICK, "sweepd_msgs/msg/Tick"),
 ];
 
-/// What there is of a tick: nothing of what nobody listened to.
+/// The parts of a tick; without readers a part is `None`.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown<'a> {
     /// The tick.
     pub tick: &'a TickRow,
-    /// All names, where they are not those of the tick before.
+    /// All names, if they differ from those of the previous tick.
     pub names: Option<&'a [NameRow]>,
     /// Bodies.
     pub bodies: Option<&'a [BodyRow]>,
@@ -38,7 +38,7 @@ pub struct Shown<'a> {
     pub pairs: Option<(&'a MessageHeader, &'a [PairRow])>,
 }
 
-/// Writes what people look at.
+/// Writes the messages for viewers.
 #[derive(Debug)]
 pub(super) struct Show {
     speaker: Speaker,
@@ -52,12 +52,12 @@ impl Show {
         }
     }
 
-    /// Ids are given anew: another boot.
+    /// Forgets all names, since another boot assigns ids anew.
     pub(super) fn forget_names(&mut self) {
         self.speaker.book = Book::default();
     }
 
-    /// All that there is of a tick but the tick itself.
+    /// Writes all parts of a tick except the tick itself.
     pub(super) fn rows<W: Medium>(
         &mut self,
         tape: &mut Tape<W>,
@@ -86,7 +86,7 @@ impl Show {
         Ok(())
     }
 
-    /// A tick, after all that belongs to it.
+    /// Writes a tick, after all its parts.
     pub(super) fn tick<W: Medium>(
         &mut self,
         tape: &mut Tape<W>,
@@ -99,7 +99,7 @@ impl Show {
         tape.write_message(TICK, time_ns, &tick)
     }
 
-    /// Pairs alone.
+    /// Writes pairs.
     pub(super) fn pairs<W: Medium>(
         &self,
         tape: &mut Tape<W>,

@@ -1,4 +1,4 @@
-//! An MCAP file as it is written: topics of CDR, one message after the other.
+//! Writes an MCAP file: CDR topics, one message after the other.
 
 use std::collections::BTreeMap;
 use std::io::{Cursor, ErrorKind, Write as _};
@@ -15,31 +15,31 @@ use super::schemas::schema;
 use super::{CDR_HEAD, END, TICKS, WHY};
 use crate::error::{Error, Result};
 
-/// Bytes of a chunk, about: what a reader has in memory at least.
+/// Approximate bytes of a chunk, which a reader holds in memory as a whole.
 const CHUNK_BYTES: usize = 1 << 20;
 
-/// A file whose topics are known.
+/// A file with a fixed list of topics.
 pub(super) struct Tape<W: Medium> {
-    /// `None`: it was closed.
+    /// `None`: the file is closed.
     writer: Option<Writer<Counted<W>>>,
-    /// What messages call the file.
+    /// Name of the file in messages.
     name: String,
     channels: BTreeMap<&'static str, (u16, u32)>,
     bytes: Vec<u8>,
-    /// Bytes of the chunk that is being filled.
+    /// Bytes in the current chunk.
     chunk_bytes: usize,
-    /// How many ticks were written.
+    /// Number of ticks written.
     ticks: u64,
-    /// How many bytes were handed to the medium.
+    /// Number of bytes handed to the medium.
     handed: Arc<AtomicU64>,
     kept: Kept,
 }
 
-/// Whole records that have arrived where they are to be.
+/// Complete records that have reached the medium.
 #[derive(Clone, Copy, Debug, Default)]
 struct Kept {
     bytes: u64,
-    /// How many ticks are in them.
+    /// Number of ticks in them.
     ticks: u64,
 }
 
@@ -53,12 +53,12 @@ impl<W: Medium> std::fmt::Debug for Tape<W> {
 }
 
 impl<W: Medium> Tape<W> {
-    /// A file without messages.
+    /// Begins a file without messages.
     ///
-    /// * `topics` - with the type of each.
+    /// * `topics` - each topic with its type.
     ///
     /// # Errors
-    /// `Error::Io` when it cannot be written.
+    /// `Error::Io` if it cannot be written.
     pub(super) fn new(
         to: W,
         name: &str,
@@ -70,9 +70,9 @@ impl<W: Medium> Tape<W> {
             .profile("ros2")
             .library(concat!("sweepd/", env!("CARGO_PKG_VERSION")))
             .compression(None)
-            // They end where this tape says, for it has to know what is in them.
+            // This type ends the chunks, since it has to know their content.
             .chunk_size(None)
-            // A chunk is written when it is whole: a process that is killed leaves none that lies of its length.
+            // A chunk is written only when it is complete: a killed process leaves none with a wrong length.
             .disable_seeking(true)
             .create(to)
             .map_err(told)?;
@@ -95,17 +95,17 @@ impl<W: Medium> Tape<W> {
         })
     }
 
-    /// The message that is written next makes a tick whole.
+    /// Counts a tick, which the next message makes complete.
     pub(super) fn count(&mut self) {
         self.ticks += 1;
     }
 
-    /// How many ticks the file has.
+    /// Number of ticks in the file.
     pub(super) fn ticks(&self) -> u64 {
         self.ticks
     }
 
-    /// Writes a message of ours: CDR of `uint8[] data`.
+    /// Writes a message of our own types: CDR of `uint8[] data`.
     pub(super) fn write_bytes(
         &mut self,
         topic: &'static str,
@@ -157,7 +157,7 @@ impl<W: Medium> Tape<W> {
         Ok(())
     }
 
-    /// Hands over what was written: it survives the end of this process.
+    /// Ends the chunk and flushes the medium: what was written then survives the end of this process.
     pub(super) fn flush(&mut self) -> Result<()> {
         self.with(|writer, _| writer.flush())?;
         self.chunk_bytes = 0;
@@ -168,9 +168,9 @@ impl<W: Medium> Tape<W> {
         Ok(())
     }
 
-    /// Writes what closes the file; one that could not be written is closed already.
+    /// Closes the file; one that could not be written is closed already.
     ///
-    /// * `notes` - its last record.
+    /// * `notes` - content of the last record.
     pub(super) fn end(&mut self, notes: BTreeMap<String, String>) -> Result<()> {
         if self.writer.is_none() {
             return Ok(());
@@ -184,7 +184,7 @@ impl<W: Medium> Tape<W> {
             writer.write_metadata(&note)?;
             writer.finish().map(drop)
         })?;
-        // That has not flushed it.
+        // `finish` does not flush the medium.
         let Some(mut medium) = self.writer.take().map(Writer::into_inner) else {
             return Ok(());
         };
@@ -195,7 +195,7 @@ impl<W: Medium> Tape<W> {
         })
     }
 
-    /// Does what may fail; when it does, the file ends with what had arrived, and says why.
+    /// Runs a write. If it fails, the file is cut after the last complete records and closed with the reason.
     fn with(
         &mut self,
         what: impl FnOnce(&mut Writer<Counted<W>>, &[u8]) -> McapResult<()>,
@@ -213,7 +213,7 @@ impl<W: Medium> Tape<W> {
         })
     }
 
-    /// Takes back the part of a record that was written last, which leaves room for a last one that says why.
+    /// Cuts off the records that were not flushed, which makes room for a last one with the reason.
     fn break_off(&mut self, medium: Counted<W>, error: &Error) {
         self.ticks = self.kept.ticks;
         let note = Metadata {
@@ -225,7 +225,7 @@ impl<W: Medium> Tape<W> {
         };
         let closed = ending_of(&note).and_then(|ending| {
             let mut medium = medium.cut(self.kept.bytes)?;
-            // Without its front it is no file of this kind, and ends empty.
+            // Without its first records the file is no MCAP file, and is left empty.
             if self.kept.bytes == 0 {
                 return Ok(());
             }
@@ -238,7 +238,7 @@ impl<W: Medium> Tape<W> {
     }
 }
 
-/// What closes a file that has no summary.
+/// The records that close a file without a summary.
 fn ending_of(note: &Metadata) -> McapResult<Vec<u8>> {
     let mut writer = WriteOptions::new()
         .emit_summary_records(false)
@@ -249,7 +249,7 @@ fn ending_of(note: &Metadata) -> McapResult<Vec<u8>> {
     writer.write_metadata(note)?;
     writer.finish()?;
     let mut bytes = writer.into_inner().into_inner();
-    // The front of the file and its header, which the file has: opcode, length, record.
+    // Drops the magic and the header (opcode, length, record), which the file has already.
     let len = bytes.get(MAGIC.len() + 1..).and_then(<[u8]>::first_chunk);
     let len = len.map_or(0, |len| u64::from_le_bytes(*len));
     let front = (MAGIC.len() + 9).saturating_add(usize::try_from(len).unwrap_or(usize::MAX));
@@ -272,7 +272,7 @@ fn told(name: &str, error: McapError) -> Error {
     };
     let what = format!("cannot write the recording {name}; {why}");
     match error {
-        // In its own words: those around it speak of compression.
+        // The error itself: the texts of mcap around it speak of compression.
         McapError::Io(error) => Error::io(what, error),
         error => Error::io(what, error),
     }

@@ -1,4 +1,4 @@
-//! Files that are whole, cut off, damaged, of others.
+//! Files that are whole, cut off, damaged, or of other programs.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -14,7 +14,7 @@ mod full;
 
 static NUMBERS: AtomicU64 = AtomicU64::new(0);
 
-/// A file that goes when it is dropped.
+/// A file that is removed when this is dropped.
 struct Scrap(PathBuf);
 
 impl Scrap {
@@ -60,7 +60,7 @@ fn record(tick: u64) -> TickRecord {
     record
 }
 
-/// A recording of so many ticks, a chunk each ten.
+/// A recording of `ticks` ticks, with one chunk per ten ticks.
 fn written(ticks: u64, why: Option<&str>) -> Scrap {
     let scrap = Scrap::new();
     let file = scrap.create();
@@ -77,7 +77,7 @@ fn written(ticks: u64, why: Option<&str>) -> Scrap {
     scrap
 }
 
-/// How many ticks are read, and how it ends.
+/// Number of ticks that are read, and the ending.
 fn read(scrap: &Scrap) -> (u64, Ending) {
     let (mut reader, _) = Reader::open(&scrap.0).unwrap();
     let mut ticks = 0;
@@ -143,7 +143,7 @@ fn a_changed_byte_ends_the_reading_at_its_chunk() {
     assert!(ticks % 10 == 0 && (10..40).contains(&ticks), "{ticks}");
 }
 
-/// Opcode and place of each record of a file.
+/// Opcode and offset of each record of a file.
 fn places(bytes: &[u8]) -> Vec<(u8, usize)> {
     let (mut at, mut all) = (8, Vec::new());
     while at + 8 < bytes.len() {
@@ -154,7 +154,7 @@ fn places(bytes: &[u8]) -> Vec<(u8, usize)> {
     all
 }
 
-/// How a recording of 50 ticks ends where one byte is another.
+/// Result of reading a recording of 50 ticks with one byte changed.
 fn changed(at: usize, to: u8) -> Result<(u64, Ending), Error> {
     let mut bytes = std::fs::read(&written(50, Some("")).0).unwrap();
     assert_ne!(bytes[at], to);
@@ -241,7 +241,7 @@ fn what_is_no_recording_of_ours_is_refused_by_name() {
     }
     let text = error(&Scrap::of(b"[[body]]\nname = \"some text\"\n"));
     assert!(text.contains("is no MCAP file"), "{text}");
-    // An MCAP file of others.
+    // An MCAP file of another program.
     let scrap = Scrap::new();
     let mut writer = mcap::Writer::new(scrap.create()).unwrap();
     writer.finish().unwrap();
@@ -258,7 +258,7 @@ fn in_a_hurry_what_is_for_people_is_left_out_and_counted_and_all_that_is_replaye
     let mut sink = McapSink::new(file, "scrap", "world", &start()).unwrap();
     for tick in 1..=30 {
         let mut record = record(tick);
-        // Names belong to what follows: they are never left out.
+        // Later messages need names, which are never left out.
         record.out.names_changed = tick == 9;
         sink.tick(&record, tick % 3 == 0).unwrap();
     }

@@ -1,4 +1,4 @@
-//! A recording is written: bit by bit for a replay, and as ROS 2 messages for people.
+//! Writes a recording: exact to the bit for a replay, and as ROS 2 messages for viewers.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::record::code::{put_input, put_output, start_bytes};
 use crate::record::{Sink, Start, TickRecord};
 
-/// Topics of our own and their types.
+/// Our own topics and their types.
 const TOPICS: [(&str, &str); 3] = [
     (START, "sweepd_record/msg/Start"),
     (INPUT, "sweepd_record/msg/Input"),
@@ -23,18 +23,18 @@ pub struct McapSink<W: Medium> {
     tape: Tape<W>,
     show: Show,
     since_1970_ns: u64,
-    /// Ticks of which nothing is there for people: the disk did not follow.
+    /// Number of ticks without messages for viewers, because the disk was too slow.
     not_shown: u64,
 }
 
 impl<W: Medium> McapSink<W> {
-    /// A recording that begins with `start`.
+    /// Begins a recording with `start`.
     ///
-    /// * `name` - what messages call the file.
+    /// * `name` - name of the file in messages.
     /// * `frame_id` - the scene's frame.
     ///
     /// # Errors
-    /// `Error::Io` when it cannot be written.
+    /// `Error::Io` if it cannot be written.
     pub fn new(to: W, name: &str, frame_id: &str, start: &Start) -> Result<Self> {
         let facts = &start.facts;
         let topics = TOPICS.into_iter().chain(shown::TOPICS);
@@ -52,7 +52,7 @@ impl<W: Medium> McapSink<W> {
         Ok(sink)
     }
 
-    /// How many ticks the file has.
+    /// Number of ticks in the file.
     #[must_use]
     pub fn ticks(&self) -> u64 {
         self.tape.ticks()
@@ -68,7 +68,7 @@ impl<W: Medium + Send> Sink for McapSink<W> {
         self.tape.count();
         self.tape
             .write_bytes(OUTPUT, time_ns, |to| put_output(out, demand, to))?;
-        // Names belong to what follows.
+        // Later messages need the names: a tick with new names is never left out.
         if hurried && !out.names_changed {
             self.not_shown += 1;
             return Ok(());

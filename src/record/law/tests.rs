@@ -1,4 +1,4 @@
-//! What is held against the law: rows made by hand, of which it is known whether they are borne out.
+//! The law on rows made by hand, for which the right judgement is known.
 
 use super::*;
 
@@ -33,9 +33,9 @@ fn what_is_open_or_borne_out_holds() {
     let open = row(2, Verdict::Possible, -1.0, 0.5);
     assert_eq!(field(vec![open], vec![deep]), None);
     assert_eq!(field(vec![deep], vec![deep]), None);
-    // Not decided, and apart.
+    // Undecided in the recording, and apart.
     assert_eq!(field(vec![open], vec![]), None);
-    // Within rounding of a touch either is right.
+    // Within rounding of a touch either verdict is right.
     let mut touch = row(2, Verdict::Colliding, -1e-16, 1e-16);
     touch.flags = pair_flags::TOUCHING;
     let near = row(2, Verdict::Near, 1e-17, 2e-16);
@@ -50,11 +50,11 @@ fn what_is_open_or_borne_out_holds() {
         for (recorded, replayed) in [(&one, &two), (&two, &one)] {
             assert_eq!(judge(recorded, replayed), None);
         }
-        // One on the way is another matter.
+        // A touch on the way is a difference.
         two.pairs[0].flags |= pair_flags::SWEPT_HIT;
         assert!(judge(&one, &two).is_some());
     }
-    // The last row of a pair that is gone says nothing of now.
+    // The last row of a pair that is gone says nothing of the present.
     let mut gone = deep;
     gone.flags = pair_flags::GONE;
     assert_eq!(field(vec![gone], vec![]), None);
@@ -65,7 +65,7 @@ fn what_is_not_borne_out_is_found() {
     let deep = row(3, Verdict::Colliding, -0.1, -0.1);
     let near = row(3, Verdict::Near, 0.1, 0.2);
     let verdict = Some("verdict".to_owned());
-    // A collision that was not told of, or none that was.
+    // A collision that was not reported, and a reported one that there is not.
     assert_eq!(field(vec![], vec![deep]), verdict);
     assert_eq!(field(vec![deep], vec![]), verdict);
     assert_eq!(
@@ -94,14 +94,14 @@ fn bug_a_touch_at_the_poses_before_is_news_where_they_were_not_decided() {
         judge(one, &two, Demand::ALL, &before, judged)
     };
     assert_eq!(judge(&one), None);
-    // Missed in the recording it is a difference all the same, and so is one on the way.
+    // If the recording misses it, that is still a difference, and so is an invented touch in the middle of the way.
     assert_eq!(field(vec![near], vec![hit]), Some("way".to_owned()));
     one.pairs[0].toi_max = 0.5;
     assert_eq!(judge(&one).unwrap().field, "way");
 }
 
-/// A tick earlier the replay certified that it collides, which the recording left open: behind a step that jumped
-/// the recording then found the first touch, of which the replay says nothing, for it is none.
+/// A tick earlier the replay certified a collision that the recording left undecided. After a teleport the recording
+/// then found its first touch, which the replay does not report, since it is not the first there.
 #[test]
 fn bug_a_touch_behind_a_jump_is_no_news_where_the_replay_certified_one_a_tick_earlier() {
     let mut hit = row(3, Verdict::Near, 0.1, 0.2);
@@ -119,14 +119,14 @@ fn bug_a_touch_behind_a_jump_is_no_news_where_the_replay_certified_one_a_tick_ea
         assert_eq!(judge(&known), None);
         assert!(judge(&Before::default()).is_some());
     }
-    // It is forgotten with the next tick, and what was cut off may have been any pair.
+    // The next tick forgets the pair; if rows were left out, any pair may have been among them.
     let mut next = out(vec![]);
     known.take(&next);
     assert!(!known.covers(&hit));
     next.pairs_header.truncated = 1;
     known.take(&next);
     assert!(known.covers(&hit));
-    // That it did not touch before is not said of a step that jumped.
+    // A teleport does not rule out an earlier touch.
     let mut early = hit;
     (early.toi_min, early.toi_max) = (0.0, 0.0);
     assert_eq!(field(vec![hit], vec![early]), None);

@@ -1,4 +1,4 @@
-//! Records in order, a disk that does not follow, a sink that fails, a writer that has the desk.
+//! The order of records, a slow disk, a sink that fails, a writer that holds the lock.
 
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -10,7 +10,7 @@ use crate::tick::TickInput;
 use crate::tick::build::build_shapes;
 use crate::time::ManualClock;
 
-/// Tells what it is handed; takes each tick only when it may.
+/// Reports its calls; `tick` returns only when the test allows it.
 struct Slow {
     told: Sender<String>,
     may: Receiver<Result<()>>,
@@ -31,7 +31,7 @@ impl Sink for Slow {
     }
 }
 
-/// An engine of one ball.
+/// An engine with one ball.
 fn engine() -> Engine {
     let text = "[[source]]\nname = \"s\"\n[[body]]\nname = \"a\"\nshape = { type = \"sphere\", radius = 1.0 }\n";
     let scene = Scene::parse(text, "s.toml", Path::new("")).unwrap();
@@ -97,7 +97,7 @@ fn a_tick_does_not_wait_for_the_writer_and_nothing_is_lost() {
     let mut engine = engine();
     let desk = Arc::clone(&recorder.desk);
     for round in 0..10 {
-        // The other thread has the desk: a wait for it would never end.
+        // The lock is held: a wait for it would never end.
         let taken = desk.lock();
         for _ in 0..round {
             run(&mut engine, &mut recorder, &Inbox::default());
@@ -116,7 +116,7 @@ fn a_tick_does_not_wait_for_the_writer_and_nothing_is_lost() {
 fn a_disk_that_does_not_follow_ends_the_recording_and_nothing_else() {
     let (mut recorder, heard, let_go) = slow();
     let mut engine = engine();
-    // Frames of a source that the scene does not have, as large as a fifth of what may wait.
+    // Frames of a source that the scene does not have, each a fifth of the limit of the queue.
     let mut inbox = Inbox::default();
     let rows = RECORD_QUEUE_BYTES_MAX / 5 / size_of::<crate::wire::TransformRow>();
     inbox.push().transforms = vec![Default::default(); rows];

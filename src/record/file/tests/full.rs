@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Seek, SeekFrom, Write};
 
 use super::*;
 
-/// A disk with so many bytes left, and with `lost` the less when room is made on it: others fill it, too.
+/// A disk with `left` free bytes; when space is freed on it, other programs take `lost` bytes.
 struct Disk {
     file: File,
     left: usize,
@@ -41,7 +41,7 @@ impl Medium for Disk {
     }
 }
 
-/// A recording of 50 ticks on such a disk, and how many ticks its writer says that it has.
+/// A recording of 50 ticks on such a disk, and the number of ticks that its writer reports.
 fn on_disk(left: usize, lost: usize) -> (Scrap, Option<u64>) {
     let scrap = Scrap::new();
     let file = File::create_new(&scrap.0).unwrap();
@@ -88,7 +88,7 @@ fn bug_a_full_disk_left_a_file_without_its_last_record_and_ticks_were_counted_th
     }
     seen.dedup();
     assert_eq!(seen, [0, 10, 20, 30, 40, 50]);
-    // No room for that record either: cut off, as by a kill.
+    // There is no room for the last record either: the file is cut off, as by a kill.
     let (scrap, told) = on_disk(whole / 2, 1 << 20);
     assert_eq!(read(&scrap), (told.unwrap(), Ending::Cut));
 }
