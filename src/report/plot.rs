@@ -1,5 +1,6 @@
-//! Line plots as inline SVG: log or linear axes with units, grid, marked points. Colours are those of the page's style
-//! sheet, so that a plot is as readable in the dark. No crate: axes, lines and labels are all there is to it.
+//! Line plots as inline SVG: log or linear axes with units, grid, marked points. Colours come from the page's style
+//! sheet, so that a plot is readable in a dark theme, too. No crate is used, since only axes, lines and labels are
+//! needed.
 //!
 //! In: series of points. Out: an `<svg>` element.
 
@@ -7,7 +8,7 @@ use std::fmt::Write as _;
 
 use super::sheet::escaped;
 
-/// Size of a plot in its own units; it is drawn as wide as its place.
+/// Size of a plot in its own units; it is drawn as wide as its column.
 const WIDTH: f64 = 560.0;
 const HEIGHT: f64 = 330.0;
 /// Margins: left (numbers and label), right, top, bottom (numbers and label).
@@ -15,54 +16,54 @@ const LEFT: f64 = 66.0;
 const RIGHT: f64 = 14.0;
 const TOP: f64 = 12.0;
 const BOTTOM: f64 = 46.0;
-/// On an axis of so many decades or fewer there are numbers between the powers of ten.
+/// An axis with at most this many decades has numbers between the powers of ten.
 const FEW_DECADES: f64 = 2.5;
-/// Numbers along an axis at most.
+/// Most numbers along an axis.
 const TICKS_MAX: i32 = 8;
 
 /// An axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// What it is, with its unit.
+    /// Its quantity, with the unit.
     pub label: String,
-    /// Decades in place of steps; what is not above 0 lies on the bottom line, marked `0`.
+    /// Logarithmic scale; values that are not above 0 lie on the lowest line, which is marked `0`.
     pub log: bool,
 }
 
 /// A line with its points.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// What the legend calls it.
+    /// Its name in the legend.
     pub name: String,
-    /// Which colour, from 0; the page has eight.
+    /// Index of its colour, from 0; the page has eight.
     pub colour: usize,
-    /// Dashed, with hollow points: what is not ours, or a lesser line.
+    /// Dashed, with hollow points: for results of other programs, and for secondary lines.
     pub dashed: bool,
-    /// By x. What is not finite is left out.
+    /// Sorted by x. Points that are not finite are left out.
     pub points: Vec<(f64, f64)>,
 }
 
 /// A plot.
 #[derive(Clone, Debug)]
 pub struct Plot {
-    /// Along the bottom.
+    /// The bottom axis.
     pub x: Axis,
-    /// Along the left.
+    /// The left axis.
     pub y: Axis,
-    /// Lines.
+    /// Its lines.
     pub series: Vec<Series>,
-    /// Levels with what they mean, drawn across.
+    /// Values with labels, drawn as horizontal lines.
     pub levels: Vec<(f64, String)>,
 }
 
-/// From values to places along an axis.
+/// Maps values to positions along an axis.
 struct Scale {
     log: bool,
     low: f64,
     high: f64,
     from: f64,
     to: f64,
-    /// Some value is not above 0: on a log axis the lowest line is theirs.
+    /// Whether some value is not above 0; on a log axis such values lie on the lowest line.
     zero: bool,
 }
 
@@ -106,13 +107,13 @@ impl Scale {
         self.place(value)
     }
 
-    /// Of what is on the axis already: a power of ten, where it is one of decades.
+    /// The position of an axis value, which is an exponent of ten on a log axis.
     fn place(&self, on_axis: f64) -> f64 {
         let share = (on_axis - self.low) / (self.high - self.low);
         self.from + share.clamp(0.0, 1.0) * (self.to - self.from)
     }
 
-    /// Twice and five times the powers of ten, where there are few of these.
+    /// Adds labels at two and five times each power of ten, for an axis of few decades.
     fn between(&self, ticks: &mut Vec<(f64, String)>) {
         let mut decade = self.low;
         while decade < self.high - 0.5 {
@@ -129,7 +130,7 @@ impl Scale {
         }
     }
 
-    /// Places with their labels.
+    /// Positions with their labels.
     fn ticks(&self) -> Vec<(f64, String)> {
         let mut ticks = Vec::new();
         let span = self.high - self.low;
@@ -157,7 +158,7 @@ impl Scale {
     }
 }
 
-/// 1, 2 or 5 times a power of ten, not below.
+/// The least number of the form 1, 2 or 5 times a power of ten that is not below `least`.
 fn round_step(least: f64) -> f64 {
     let unit = 10.0_f64.powf(least.log10().floor());
     let factor = [1.0, 2.0, 5.0, 10.0];
@@ -171,7 +172,7 @@ fn plain(value: f64) -> String {
     if text == "-0" { "0" } else { text }.to_owned()
 }
 
-/// Ten to a power, as people write it.
+/// A power of ten as text: in full from 0.01 to 1000, else with a raised exponent.
 fn power(exponent: f64) -> String {
     let whole = exponent.round();
     if (-2.0..=3.0).contains(&whole) {
@@ -181,7 +182,7 @@ fn power(exponent: f64) -> String {
 }
 
 impl Plot {
-    /// The plot as SVG; nothing where there is no point.
+    /// The plot as SVG, with its legend; a note if there is no finite point.
     #[must_use]
     pub fn svg(&self) -> String {
         let points = || self.series.iter().flat_map(|s| s.points.iter().copied());

@@ -1,6 +1,6 @@
-//! An engine that is fed by hand, without transport: what both reports drive.
+//! An engine that is fed directly, without transport; both reports use it.
 //!
-//! In: a checked scene with its shapes, poses a tick. Out: the engine's outbox, and how long it took.
+//! In: a checked scene with its shapes, and poses for each tick. Out: the engine's outbox, and the time of the tick.
 
 use std::sync::Arc;
 
@@ -16,9 +16,9 @@ use crate::wire::{
 };
 use crate::world::Parts;
 
-/// The session that all frames of a report are of.
+/// The session of all frames of a report.
 const SESSION: u64 = 1;
-/// What is asked for: pairs with their bounds; contacts would be work that no figure tells of.
+/// The requested outputs: pairs with their bounds. Contacts would be work that no figure shows.
 const DEMAND: Demand = Demand {
     pairs: true,
     contacts: false,
@@ -30,13 +30,13 @@ const DEMAND: Demand = Demand {
     changes_anew: false,
 };
 
-/// An engine, and what it is fed with.
+/// An engine and its input.
 pub struct Rig {
     engine: Engine,
     clock: Arc<dyn Clock>,
     inbox: Inbox,
     names: Vec<String>,
-    /// Source, body, and the vertices of each body that deforms: sent once, as they are at rest.
+    /// Source, body, and the vertices at rest of each body that deforms, which are sent once.
     vertices: Vec<(usize, u64, Vec<[f32; 3]>)>,
     seq: u64,
 }
@@ -50,12 +50,12 @@ impl std::fmt::Debug for Rig {
 }
 
 impl Rig {
-    /// An engine for a scene and its built shapes, in the scene's order.
+    /// An engine for a scene and its built shapes, in the order of the scene's bodies.
     ///
     /// # Errors
-    /// `Error::Scene` when the scene holds more than its limits allow.
+    /// `Error::Scene` if the scene exceeds its limits.
     pub fn new(scene: &Scene, shapes: &[Parts], clock: Arc<dyn Clock>) -> Result<Self> {
-        // A row that is left out for want of room says nothing: of what there is no row would not be known apart.
+        // With a limit of rows a missing row would not mean that its pair is apart.
         let mut whole = scene.clone();
         whole.config.limits.pair_rows = usize::MAX;
         let engine = Engine::new(&whole, shapes.to_vec(), 1, Arc::clone(&clock))?;
@@ -78,10 +78,10 @@ impl Rig {
         })
     }
 
-    /// One tick with a frame of each source, and all that its budget leaves.
+    /// Runs one tick with a frame of each source, and then all work that is left within its budget.
     ///
-    /// * `frames` - rows by the source's place.
-    /// * returns - what it took from wake-up until nothing was left to work on, nanoseconds of the engine's clock.
+    /// * `frames` - rows of each source, by its index.
+    /// * returns - time from wake-up until no work was left, nanoseconds of the engine's clock.
     pub fn tick(&mut self, frames: &[Vec<TransformRow>], budget: Budget) -> u64 {
         self.seq += 1;
         self.inbox.clear();
@@ -118,7 +118,7 @@ impl Rig {
         self.clock.monotonic_ns() - woke_ns
     }
 
-    /// What the last tick filled.
+    /// The outbox of the last tick.
     #[must_use]
     pub fn out(&self) -> &Outbox {
         self.engine.outbox()
@@ -130,7 +130,7 @@ impl Rig {
         &self.engine
     }
 
-    /// Bodies that deform are unknown until their vertices have come.
+    /// Sends the vertices of bodies that deform, which are unknown until then.
     fn send_vertices(&mut self, now_ns: u64) {
         for (source, body, rows) in &self.vertices {
             let count = u32::try_from(rows.len()).unwrap_or(u32::MAX);

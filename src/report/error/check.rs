@@ -1,6 +1,6 @@
-//! One tick of a limited engine against the truth of the same tick. Pure: what was told, and what is true.
+//! Compares one tick of a limited engine with the truth of the same tick. Pure: it depends on nothing else.
 //!
-//! In: rows of both, and a way to ask for the gap of a pair that the twin did not tell. Out: a [`Checked`].
+//! In: rows of both, and a function for the gap of a pair that the twin did not report. Out: a [`Checked`].
 
 use std::collections::BTreeMap;
 
@@ -10,23 +10,23 @@ use crate::wire::{PairRow, Verdict, pair_flags};
 /// Ids of a pair, the smaller one first.
 pub type Key = (u64, u64);
 
-/// What a row says.
+/// The statement of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Told {
-    /// Which pair.
+    /// The pair.
     pub key: Key,
     /// Its verdict.
     pub verdict: Verdict,
-    /// Its verdict when it had one last.
+    /// Its last certified verdict.
     pub last: Verdict,
     /// Its interval, metres.
     pub gap: Interval,
-    /// A body of it is not known: then no work decides it.
+    /// Whether the pose of one of its bodies is unknown: then no work decides it.
     pub unknown: bool,
 }
 
 impl Told {
-    /// What is to be held against the truth; `None`: a row that only carries an event.
+    /// The statement to compare with the truth; `None`: the row only carries an event.
     #[must_use]
     pub fn of(row: &PairRow) -> Option<Self> {
         let verdict = Verdict::from_code(row.verdict)?;
@@ -44,24 +44,24 @@ impl Told {
     }
 }
 
-/// What is to be said of a tick.
+/// The counts of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Checked {
-    /// Pairs without a verdict that the twin has one for.
+    /// Undecided pairs that the twin decided.
     pub undecided: u64,
-    /// Of them those whose last verdict is not the truth.
+    /// Of them, those whose last verdict is not the truth.
     pub guess_errors: u64,
-    /// Verdicts that are not the truth, and pairs that were left out and collide.
+    /// Verdicts that are not the truth, and colliding pairs without a row.
     pub wrong: u64,
-    /// Intervals that do not hold the truth.
+    /// Intervals that exclude the truth.
     pub excluded: u64,
 }
 
-/// Holds a tick against the truth.
+/// Compares a tick with the truth.
 ///
-/// * `told` - by key.
+/// * `told` - rows of the tick, sorted by key.
 /// * `truth` - rows of the twin, by key.
-/// * `ask` - the gap of a pair that the twin told nothing of, or left with an open end.
+/// * `ask` - the gap of a pair that the twin did not report, or reported with an open end.
 pub fn check(
     told: &[Told],
     truth: &BTreeMap<Key, Told>,
@@ -87,7 +87,7 @@ pub fn check(
             found.guess_errors += u64::from((told.last == Verdict::Colliding) != collides);
         }
     }
-    // No row says that a pair is apart, too.
+    // A missing row also says that the pair is apart.
     let left_out = truth.values().filter(|known| {
         let proved = known.verdict == Verdict::Colliding && known.gap.max <= 0.0 && !known.unknown;
         proved

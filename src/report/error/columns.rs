@@ -1,4 +1,4 @@
-//! The columns of the report's tables, on a terminal and on a page: one list for both.
+//! The columns of the report's tables, the same on a terminal and on a page.
 
 use super::Report;
 use super::page::name;
@@ -9,15 +9,15 @@ use super::tally::Row;
 pub struct Column {
     /// Its head.
     pub name: &'static str,
-    /// The unit of what it tells, or more of the head.
+    /// The unit of its values, or the second line of the head.
     pub unit: &'static str,
-    /// Letters of it on a terminal.
+    /// Width on a terminal, characters.
     pub width: usize,
-    /// It tells something only where time is limited.
+    /// Whether it is shown only if time is limited.
     pub timed: bool,
-    /// A count that is 0 where nothing is wrong.
+    /// Whether it is a count that is 0 if nothing is wrong.
     pub must_be_0: bool,
-    /// What it tells of a row.
+    /// The text of its cell in a row.
     pub cell: fn(&Row) -> String,
 }
 
@@ -55,7 +55,7 @@ const fn must_be_0(of: Column) -> Column {
     }
 }
 
-/// All, in their order.
+/// All columns, in order.
 const COLUMNS: [Column; 16] = [
     column(("budget", ""), 13, name),
     column(("undecided", "%"), 9, |row| {
@@ -93,7 +93,7 @@ const COLUMNS: [Column; 16] = [
     must_be_0(column(("excluded", ""), 8, |row| row.excluded.to_string())),
 ];
 
-/// Those of a report, in their order: of times only where time is limited.
+/// The columns of a report, in order; those of times only if time is limited.
 pub fn columns(report: &Report) -> impl Iterator<Item = &'static Column> {
     let timed = report.limited == "time";
     COLUMNS.iter().filter(move |column| timed || !column.timed)

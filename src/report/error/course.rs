@@ -1,4 +1,4 @@
-//! Where the bodies of a scene are in each tick: the built-in motion of `feed`, for all sources at once.
+//! The poses of a scene's bodies in each tick: the built-in motion of `feed`, for all sources at once.
 
 use crate::builtin::{Motion, Random};
 use crate::report::rig::row;
@@ -7,7 +7,7 @@ use crate::wire::TransformRow;
 
 use super::Setup;
 
-/// The motion of a scene. What no frame may move (bodies that stand, that are attached to others) stays where it is.
+/// The motion of a scene. Bodies that no frame may move (fixed or attached ones) stay where they are.
 #[derive(Clone, Debug)]
 pub struct Course {
     sources: Vec<Vec<(u64, Motion)>>,
@@ -16,7 +16,7 @@ pub struct Course {
 }
 
 impl Course {
-    /// Drawn from the seed, source by source, as `feed` does for each of them.
+    /// Drawn from the seed, source by source, as `feed` does for each source.
     #[must_use]
     pub fn new(setup: &Setup<'_>) -> Self {
         let of = |source: usize| {
@@ -39,7 +39,7 @@ impl Course {
         }
     }
 
-    /// A frame of each source.
+    /// One frame of each source.
     #[must_use]
     pub fn frames(&self, tick: u64) -> Vec<Vec<TransformRow>> {
         #[allow(clippy::cast_precision_loss, reason = "counts far below 2^53")]
@@ -55,7 +55,7 @@ impl Course {
         self.sources.iter().map(frame).collect()
     }
 
-    /// Bodies that move.
+    /// Number of bodies that move.
     #[must_use]
     pub fn moving(&self) -> usize {
         let own = |bodies: &Vec<_>| bodies.len().min(self.count);

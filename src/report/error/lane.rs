@@ -1,4 +1,4 @@
-//! One budget's engine and its twin without one.
+//! The engine of one budget, and its twin without a budget.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,17 +15,17 @@ use crate::report::rig::Rig;
 use crate::time::{Budget, Clock, ManualClock, Meter, SystemClock};
 use crate::wire::Verdict;
 
-/// When the clock of counted work begins: any time but 0, which would say that nothing was received.
+/// Start of the clock of work budgets, nanoseconds: any time but 0, which would mean that nothing was received.
 const START_NS: u64 = 1_000_000_000;
 
-/// An engine within one budget.
+/// An engine with one budget.
 pub(super) struct Lane {
     rig: Rig,
     budget: Budget,
-    /// Where no real time counts.
+    /// The clock of a work budget; `None`: real time counts.
     manual: Option<Arc<ManualClock>>,
     period_ns: u64,
-    /// What was told in each tick of the block, by key.
+    /// Rows of each tick of the block, sorted by key.
     told: Vec<Vec<Told>>,
     tally: Tally,
 }
@@ -47,7 +47,7 @@ impl Lane {
         })
     }
 
-    /// Runs a tick and keeps what it told.
+    /// Runs a tick and keeps its rows.
     pub(super) fn tick(&mut self, course: &Course, tick: u64, counts: bool) {
         if let Some(clock) = &self.manual {
             clock.advance(self.period_ns);
@@ -64,7 +64,7 @@ impl Lane {
         self.told.push(told);
     }
 
-    /// Holds one tick of the block against the twin's.
+    /// Compares one tick of the block with the twin's.
     pub(super) fn compare(&mut self, twin: &mut Twin, tick: u64, at: u64, counts: bool) {
         let Some(told) = usize::try_from(at).ok().and_then(|at| self.told.get(at)) else {
             return;
@@ -73,7 +73,7 @@ impl Lane {
         let found = check(told, &truth, |key| twin.ask(key));
         self.tally.onsets(told, &truth, tick, counts);
         twin.truth = truth;
-        // A wrong answer counts in the warm-up, too.
+        // Wrong answers count in the warm-up, too.
         let kept = if counts {
             found
         } else {
@@ -111,9 +111,9 @@ pub(super) struct Twin {
     clock: Arc<ManualClock>,
     period_ns: u64,
     slots: BTreeMap<u64, BodySlot>,
-    /// What it told in its last tick.
+    /// Its rows of the last tick.
     truth: BTreeMap<Key, Told>,
-    /// Gaps asked for beside it in its last tick.
+    /// Further gaps that were computed for its last tick.
     asked: BTreeMap<Key, Interval>,
 }
 
@@ -144,7 +144,7 @@ impl Twin {
         self.asked.clear();
     }
 
-    /// The gap of a pair at this tick's poses, by a query that remembers nothing.
+    /// The gap of a pair at this tick's poses, by a query without memory of earlier ticks.
     fn ask(&mut self, key: Key) -> Interval {
         if let Some(gap) = self.asked.get(&key) {
             return *gap;
@@ -163,7 +163,7 @@ impl Twin {
     }
 }
 
-/// Whether a pair collides for certain.
+/// Whether a pair is certified as colliding.
 pub(super) fn collides(told: &Told) -> bool {
     told.verdict == Verdict::Colliding
 }

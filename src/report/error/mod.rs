@@ -1,11 +1,11 @@
-//! Error against run time: one scene in one motion, at a sweep of budgets, each answer held against a twin engine
-//! without a budget at the same poses.
+//! Error against run time: one scene in one motion at a sweep of budgets. Each answer is compared with that of a twin
+//! engine without a budget at the same poses.
 //!
-//! In: a checked scene with its shapes ([`Setup`]). Out: a [`Report`], a row a budget. Budgets of time are measured on
-//! the machine's clock; budgets of work units read no clock, and a report over them is the same to the last bit.
+//! In: a checked scene with its shapes ([`Setup`]). Out: a [`Report`], one row per budget. Time budgets are measured on
+//! the machine's clock; work budgets read no clock, so that a report on them is the same to the last bit.
 //!
-//! Each budget's engine runs some ticks by itself before the next one does, so that it is as warm as it would be alone;
-//! then the twin goes over the same ticks, and what was told is compared.
+//! Each budget's engine runs a block of ticks before the next one does, so that its memory is as warm as if it ran
+//! alone. Then the twin runs the same ticks, and the answers are compared.
 
 pub mod check;
 pub mod columns;
@@ -30,40 +30,40 @@ use course::Course;
 use lane::{Lane, Twin};
 use tally::Row;
 
-/// Ticks that one engine runs by itself before the next one does: enough that its memory is warm for most of them, few
-/// enough that what it told fits into memory.
+/// Ticks that one engine runs before the next one does: enough that its memory is warm for most of them, few enough
+/// that all their rows fit into memory.
 const BLOCK_TICKS: u64 = 16;
-/// Ticks of the pilot run that finds out what to sweep over.
+/// Ticks of the pilot run that determines the budgets.
 const PILOT_TICKS: u64 = 24;
-/// The longest budget that a sweep ends with at least, nanoseconds: what is kept back for publishing is some tens of
-/// microseconds, however little a scene has to do.
+/// Least value of a sweep's longest time budget, nanoseconds: some tens of microseconds are kept back for publishing,
+/// however little work a scene has.
 const TIME_MIN_NS: u64 = 200_000;
-/// Budgets where none are given.
+/// Number of budgets if none are given; a sweep over work units adds 0 and no limit.
 const BUDGETS: i32 = 9;
 
-/// What is limited, and how.
+/// The limited quantity, and its limits.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Sweep {
-    /// Time a tick, nanoseconds; `None`: without end. Of an empty list the scene decides.
+    /// Time per tick, nanoseconds; `None`: no limit. If the list is empty, the scene determines the budgets.
     Time(Vec<Option<u64>>),
-    /// Work units a tick, likewise.
+    /// Work units per tick, likewise.
     Units(Vec<Option<u64>>),
 }
 
-/// What is run.
+/// What to run.
 #[derive(Clone, Debug)]
 pub struct Setup<'a> {
     /// The scene.
     pub scene: &'a Scene,
-    /// Its built shapes, in its order.
+    /// Its built shapes, in the order of its bodies.
     pub shapes: &'a [Parts],
-    /// How bodies move.
+    /// Motion of the bodies.
     pub motion: Pattern,
-    /// Frames a second.
+    /// Frames per second.
     pub rate_hz: f64,
     /// Seed of the motion.
     pub seed: u64,
-    /// Bodies of each source that move; `None`: all.
+    /// Number of bodies of each source that move; `None`: all.
     pub count: Option<usize>,
     /// Ticks at each budget.
     pub ticks: u64,
@@ -71,36 +71,36 @@ pub struct Setup<'a> {
     pub sweep: Sweep,
 }
 
-/// What was found out.
+/// Results of a sweep.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// Version of sweepd.
     pub version: &'static str,
-    /// Bodies of the scene.
+    /// Number of bodies of the scene.
     pub bodies: usize,
-    /// Those that the motion moves.
+    /// Number of bodies that the motion moves.
     pub moving: usize,
-    /// Median diameter of the scene's bounded bodies, metres: what widths may be held against.
+    /// Median diameter of the scene's bounded bodies, metres: a scale for the widths.
     pub size_m: f64,
-    /// Frames a second.
+    /// Frames per second.
     pub rate_hz: f64,
     /// Seed of the motion.
     pub seed: u64,
     /// Ticks that count, at each budget.
     pub ticks: u64,
-    /// Ticks before them.
+    /// Number of warm-up ticks before them.
     pub warm_up_ticks: u64,
-    /// `time` or `units`: what is limited.
+    /// `time` or `units`: the limited quantity.
     pub limited: &'static str,
     /// Verdicts that are not the truth, over all budgets.
     pub wrong: u64,
-    /// Intervals that do not hold the truth, over all budgets.
+    /// Intervals that exclude the truth, over all budgets.
     pub excluded: u64,
-    /// Every pair had its verdict in every tick, at every budget.
+    /// Whether every pair had its verdict in every tick, at every budget.
     pub decided_everywhere: bool,
     /// Mean number of pairs whose boxes overlap.
     pub pairs: f64,
-    /// By budget, the least first.
+    /// One row per budget, the least first.
     pub rows: Vec<Row>,
 }
 
@@ -114,11 +114,11 @@ impl Report {
 
 /// Runs the sweep.
 ///
-/// * `progress` - told now and then: how many engine ticks are done, of how many; says whether to go on.
+/// * `progress` - called before each engine tick with the number done and the total; returns whether to go on.
 /// * returns - `None`: stopped.
 ///
 /// # Errors
-/// `Error::Scene` when the scene holds more than its limits allow.
+/// `Error::Scene` if the scene exceeds its limits.
 pub fn run(
     setup: &Setup<'_>,
     mut progress: impl FnMut(u64, u64) -> bool,
@@ -191,7 +191,7 @@ fn size_m(shapes: &[Parts]) -> f64 {
     quantile(&sizes, 0.5).unwrap_or(0.0)
 }
 
-/// The budgets to sweep over, the least first; without end last.
+/// The budgets to sweep over, the least first; no limit is last.
 fn budgets(setup: &Setup<'_>, course: &Course) -> Result<Vec<Budget>> {
     let (Sweep::Time(given) | Sweep::Units(given)) = &setup.sweep;
     let timed = matches!(setup.sweep, Sweep::Time(_));
@@ -209,15 +209,15 @@ fn budgets(setup: &Setup<'_>, course: &Course) -> Result<Vec<Budget>> {
     Ok(limits.into_iter().map(budget).collect())
 }
 
-/// A few ticks without a budget, and what they took: from the floor to twice what slow ticks take, evenly on a log
-/// scale.
+/// Runs a few ticks without a budget and derives the limits from them, evenly on a log scale: from the median floor to
+/// twice the 90th percentile of time, or up to the most work units, with 0 and no limit.
 fn pilot(setup: &Setup<'_>, course: &Course, timed: bool) -> Result<Vec<Option<u64>>> {
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
     let mut rig = Rig::new(setup.scene, setup.shapes, clock)?;
     let (mut floors, mut whole, mut units) = (Vec::new(), Vec::new(), Vec::new());
     for tick in 0..PILOT_TICKS {
         let took_ns = rig.tick(&course.frames(tick), Budget::UNLIMITED);
-        // The first ticks build what all others keep.
+        // The first ticks build structures that all later ones keep.
         if tick >= PILOT_TICKS / 4 {
             floors.push(rig.out().tick.floor_ns);
             whole.push(took_ns);
@@ -241,7 +241,7 @@ fn pilot(setup: &Setup<'_>, course: &Course, timed: bool) -> Result<Vec<Option<u
     Ok(limits)
 }
 
-/// Numbers from one to another, evenly on a log scale, of two digits each.
+/// Numbers from `from` to `to`, evenly on a log scale, rounded to two digits.
 fn steps(from: u64, to: u64) -> Vec<Option<u64>> {
     #[allow(
         clippy::cast_precision_loss,

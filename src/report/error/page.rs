@@ -8,9 +8,9 @@ use super::tally::Row;
 use crate::report::plot::{Axis, Plot, Series};
 use crate::report::sheet::{escaped, figure, must_be_0, page, table};
 
-/// The page.
+/// The report as a page.
 ///
-/// * `scene` - its name, for people.
+/// * `scene` - name of the scene on the page.
 #[must_use]
 pub fn html(report: &Report, scene: &str) -> String {
     let class = if report.is_wrong() { "bad" } else { "good" };
@@ -60,7 +60,7 @@ pub fn html(report: &Report, scene: &str) -> String {
     page("sweepd: error against run time", &(body + "</div>\n"))
 }
 
-/// What the sweep says in a sentence or two.
+/// The result of the sweep in a sentence or two.
 #[must_use]
 pub fn summary(report: &Report) -> String {
     if report.pairs <= 0.0 {
@@ -76,7 +76,7 @@ pub fn summary(report: &Report) -> String {
             name(first)
         );
     }
-    // A later one that was held up by something else on the machine counts against all before it.
+    // A larger budget with an undecided pair, even if another process delayed it, counts against all smaller ones.
     let open = report.rows.iter().rposition(|row| row.undecided > 0);
     let enough = open.and_then(|at| report.rows.get(at + 1));
     enough.map_or_else(
@@ -90,7 +90,7 @@ pub fn summary(report: &Report) -> String {
     )
 }
 
-/// A budget in words.
+/// A budget as text.
 #[must_use]
 pub fn name(row: &Row) -> String {
     match (row.budget_ns, row.budget_units) {
@@ -110,7 +110,7 @@ fn time(ns: Option<u64>) -> String {
     }
 }
 
-/// What a series takes from a row.
+/// The value that a series takes from a row.
 type Of = fn(&Row) -> Option<f64>;
 
 #[allow(clippy::cast_precision_loss, reason = "plotted")]
@@ -123,7 +123,7 @@ fn number(value: Option<u64>) -> Option<f64> {
     value.map(|value| value as f64)
 }
 
-/// A line of a plot: its name, its colour, whether it is dashed, what it takes.
+/// A line of a plot: its name, its colour, whether it is dashed, its value.
 type Line = (&'static str, usize, bool, Of);
 
 /// A plot over the budgets.
@@ -176,7 +176,7 @@ const ANSWERS: [Shown; 3] = [
     },
 ];
 
-/// Where time is limited.
+/// Plots of time budgets.
 const TIMES: [Shown; 2] = [
     Shown {
         title: "Time of a tick",

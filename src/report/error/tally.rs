@@ -1,4 +1,4 @@
-//! The sums of one budget's ticks, and the row that they make.
+//! The sums over the ticks of one budget, and the row that they make.
 
 use std::collections::BTreeMap;
 
@@ -10,69 +10,69 @@ use crate::report::stats::{mean, quantile, share};
 use crate::time::Budget;
 use crate::wire::TickRow;
 
-/// What was found out at one budget. Times in nanoseconds, lengths in metres, shares of 1; `null`: nothing to tell.
+/// Results at one budget. Times in nanoseconds, lengths in metres, shares of 1; `null`: no value.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// Time a tick; `null`: not limited.
+    /// Time budget of a tick; `null`: not limited.
     pub budget_ns: Option<u64>,
-    /// Work units a tick; `null`: not limited.
+    /// Work budget of a tick, units; `null`: not limited.
     pub budget_units: Option<u64>,
     /// Mean number of pairs whose boxes overlap.
     pub pairs: f64,
-    /// Mean number of pairs told as colliding.
+    /// Mean number of pairs reported as colliding.
     pub colliding: f64,
     /// Pair-ticks without a verdict.
     pub undecided: u64,
-    /// The same in parts of all pair-ticks.
+    /// Their share of all pair-ticks.
     pub undecided_share: f64,
-    /// Pair-ticks without a verdict whose last one is not the truth, in parts of all pair-ticks.
+    /// Share of all pair-ticks that have no verdict and whose last verdict is not the truth.
     pub guess_error_share: f64,
-    /// Mean width of the intervals of the pairs that are told (colliding, possible, near).
+    /// Mean width of the intervals of the reported pairs (colliding, possible, near).
     pub width_mean_m: Option<f64>,
-    /// 99th of a hundred of those widths.
+    /// 99th percentile of those widths.
     pub width_p99_m: Option<f64>,
-    /// Pair-ticks told with an interval without an end, which the widths leave out.
+    /// Pair-ticks whose interval has an open end, which the widths leave out.
     pub width_endless: u64,
-    /// Ticks for which the oldest pair has been without a verdict.
+    /// Longest time that a pair was without a verdict, ticks.
     pub oldest_ticks: u64,
-    /// Collisions that began.
+    /// Number of collisions that began.
     pub onsets: u64,
-    /// Ticks from the first tick of a collision until it is told as certain; median.
+    /// Ticks from the first tick of a collision until it is reported as certain; median.
     pub onset_p50_ticks: Option<u64>,
-    /// 99th of a hundred.
+    /// 99th percentile of the same.
     pub onset_p99_ticks: Option<u64>,
-    /// Collisions that were not told as certain until they, or the ticks, ended (they were told as possible).
+    /// Collisions that were not reported as certain until they, or the ticks, ended (they were reported as possible).
     pub onsets_never: u64,
-    /// Time of a whole tick, with what is worked on after its outbox is filled; median.
+    /// Time of a whole tick, with the work after its outbox is filled; median.
     pub time_p50_ns: Option<u64>,
-    /// 99th of a hundred.
+    /// 99th percentile of the same.
     pub time_p99_ns: Option<u64>,
-    /// What of a tick cannot be cut; median.
+    /// The part of a tick that cannot be cut; median.
     pub floor_p50_ns: Option<u64>,
     /// Time beyond the budget, or beyond the floor where that is more; median.
     pub over_p50_ns: Option<u64>,
-    /// 99th of a hundred.
+    /// 99th percentile of the same.
     pub over_p99_ns: Option<u64>,
-    /// Ticks that ended after their budget.
+    /// Share of ticks that ended after their budget.
     pub late_share: Option<f64>,
-    /// Mean work units a tick.
+    /// Mean work units per tick.
     pub units_mean: f64,
     /// Most work units of a tick.
     pub units_max: u64,
     /// Verdicts that are not the truth.
     pub wrong: u64,
-    /// Intervals that do not hold the truth.
+    /// Intervals that exclude the truth.
     pub excluded: u64,
 }
 
-/// A collision that is going on.
+/// A collision in progress.
 #[derive(Clone, Copy, Debug)]
 struct Onset {
     since: u64,
     told: bool,
 }
 
-/// Sums.
+/// Sums over the ticks of one budget.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     ticks: u64,
@@ -88,10 +88,10 @@ pub(super) struct Tally {
     never: u64,
     times_ns: Vec<u64>,
     floors_ns: Vec<u64>,
-    /// Ticks that said they were late.
+    /// Number of ticks that reported an overrun.
     overruns: u64,
     units: Vec<u64>,
-    /// The tick before counted, too: what begins now is an onset.
+    /// Whether the previous tick counted: then a collision that begins now is an onset.
     counted: bool,
 }
 
@@ -124,7 +124,7 @@ impl Tally {
         self.found.excluded += found.excluded;
     }
 
-    /// Follows collisions from their first tick to the one in which they are told. Those that were there before the
+    /// Follows collisions from their first tick to the one in which they are reported. Collisions that began before the
     /// ticks that count have no onset.
     pub(super) fn onsets(
         &mut self,
@@ -165,7 +165,7 @@ impl Tally {
 
     pub(super) fn row(mut self, budget: Budget) -> Row {
         let budget_ns = budget.time_ns;
-        // Below its floor a tick takes the floor: then there is nothing to overshoot by.
+        // A tick takes at least its floor: a budget below the floor is overrun only by the time beyond the floor.
         let over = self.times_ns.iter().zip(&self.floors_ns);
         let mut over_ns: Vec<u64> = budget_ns.map_or_else(Vec::new, |budget_ns| {
             over.map(|(time, floor)| time.saturating_sub(budget_ns.max(*floor)))
@@ -232,7 +232,7 @@ mod tests {
         }
     }
 
-    /// Each tick's verdict, and the truth.
+    /// The row of ticks with these verdicts and truths.
     fn row(ticks: &[(Verdict, Verdict)]) -> Row {
         let mut tally = Tally::default();
         for (tick, (said, truth)) in (0..).zip(ticks) {
@@ -252,7 +252,7 @@ mod tests {
         assert_eq!((told.onsets, told.onsets_never), (1, 0));
         let ended = row(&[&begin[..], &[(Near, Near)]].concat());
         assert_eq!((ended.onsets, ended.onsets_never), (1, 1));
-        // What was there before the ticks that count has no onset.
+        // A collision that began before the ticks that count has no onset.
         let before = row(&[(Possible, Colliding), (Possible, Colliding)]);
         assert_eq!((before.onsets, before.onsets_never), (0, 0));
     }

@@ -1,11 +1,11 @@
-//! Numbers of twice the precision of f64, as a pair of f64 of which the second is what the first one rounds off: some
-//! 31 digits. Truths are computed in them, so that a truth is surer than any interval that it is held against.
+//! Numbers with twice the precision of f64, some 31 digits: a pair of f64, of which the second is the rounding error of
+//! the first. Truths are computed in them, and so are more precise than any interval compared with them.
 //!
-//! In: f64, taken as exact. Out: sums, products, quotients and roots with an error of some 1e-31 of the result, and
-//! absolutely of 1e-300 where products fall below the range of f64.
+//! In: f64, taken as exact. Out: sums, products, quotients and roots with an error of some 1e-31 of the result, and an
+//! absolute one of 1e-300 where products fall below the range of f64.
 //!
 //! Source: Dekker 1971, A floating-point technique for extending the available precision; Hida, Li, Bailey 2001,
-//! Algorithms for quad-double precision arithmetic (which names the sums and products as here).
+//! Algorithms for quad-double precision arithmetic (the source of the names of sums and products).
 
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -17,7 +17,7 @@ pub struct Dd {
     lo: f64,
 }
 
-/// `a + b` and what rounds off.
+/// `a + b`, with its rounding error.
 fn two_sum(a: f64, b: f64) -> Dd {
     let hi = a + b;
     let part = hi - a;
@@ -27,7 +27,7 @@ fn two_sum(a: f64, b: f64) -> Dd {
     }
 }
 
-/// The same where `a` is not the lesser of the two.
+/// The same, if `a` is not the smaller one in magnitude.
 fn quick_sum(a: f64, b: f64) -> Dd {
     let hi = a + b;
     Dd {
@@ -43,7 +43,7 @@ fn split(a: f64) -> (f64, f64) {
     (hi, a - hi)
 }
 
-/// `a * b` and what rounds off.
+/// `a * b`, with its rounding error.
 fn two_product(a: f64, b: f64) -> Dd {
     let hi = a * b;
     let ((ah, al), (bh, bl)) = (split(a), split(b));
@@ -54,7 +54,7 @@ fn two_product(a: f64, b: f64) -> Dd {
 }
 
 impl Dd {
-    /// Nothing.
+    /// Zero.
     pub const ZERO: Self = Self { hi: 0.0, lo: 0.0 };
 
     /// The nearest f64.
@@ -69,7 +69,7 @@ impl Dd {
         two_sum(to, -from)
     }
 
-    /// The root; of what is not above 0, 0.
+    /// The square root; 0 if the number is not above 0.
     #[must_use]
     pub fn sqrt(self) -> Self {
         if self.hi <= 0.0 {
@@ -80,19 +80,19 @@ impl Dd {
         quick_sum(root, off / (2.0 * root))
     }
 
-    /// Without its sign.
+    /// The absolute value.
     #[must_use]
     pub fn abs(self) -> Self {
         if self < Self::ZERO { -self } else { self }
     }
 
-    /// The greater one.
+    /// The greater of the two.
     #[must_use]
     pub fn max(self, other: Self) -> Self {
         if self < other { other } else { self }
     }
 
-    /// The lesser one.
+    /// The lesser of the two.
     #[must_use]
     pub fn min(self, other: Self) -> Self {
         if other < self { other } else { self }
@@ -164,7 +164,7 @@ impl PartialOrd for Dd {
 pub struct V3(pub [Dd; 3]);
 
 impl V3 {
-    /// Of f64, taken as exact.
+    /// A vector of f64, taken as exact.
     #[must_use]
     pub fn from(v: [f64; 3]) -> Self {
         Self(v.map(Dd::from))
@@ -192,21 +192,21 @@ impl V3 {
         self.dot(self).sqrt()
     }
 
-    /// Times a number.
+    /// The product with a number.
     #[must_use]
     pub fn scaled(&self, by: Dd) -> Self {
         Self(self.0.map(|x| x * by))
     }
 
-    /// At length 1; `None` where it has none.
+    /// The unit vector; `None`: the length is 0 or not finite.
     #[must_use]
     pub fn unit(&self) -> Option<Self> {
-        // Scaled first, so that no square falls below the range.
+        // Scaled first, so that no square falls below the range of f64.
         let largest = self.0.iter().fold(Dd::ZERO, |most, x| most.max(x.abs()));
         if !(largest.near() > 0.0 && largest.near().is_finite()) {
             return None;
         }
-        // A power of two: exact, and no quotient can leave the range.
+        // By a power of two, which is exact and keeps the quotients within the range.
         let by = Dd::from(2.0_f64.powi(-exponent(largest.near())));
         let scaled = self.scaled(by);
         let length = scaled.norm();
@@ -214,7 +214,7 @@ impl V3 {
     }
 }
 
-/// The power of two next to a positive number, within what its inverse can be.
+/// Exponent of the greatest power of two that is not above a positive number, clamped so that its inverse is finite.
 fn exponent(x: f64) -> i32 {
     #[allow(clippy::cast_possible_truncation, reason = "at most 1100")]
     let power = x.log2().floor() as i32;
@@ -237,19 +237,19 @@ impl Sub for V3 {
     }
 }
 
-/// A place of a body: where its frame is, from an origin near by, and how it is turned.
+/// A pose: the position of a body's frame relative to a nearby origin, and its orientation.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
-    /// Of the frame's origin.
+    /// Position of the frame's origin.
     pub at: V3,
     /// x, y, z, w, of any length but 0.
     turn: [Dd; 4],
 }
 
 impl Place {
-    /// A place seen from `origin`; the difference of the two positions is exact.
+    /// A pose relative to `origin`; the difference of the two positions is exact.
     ///
-    /// * `xyzw` - of any length but 0: what a sender wrote, before it is normalised.
+    /// * `xyzw` - of any length but 0, as a sender writes it before it is normalised.
     #[must_use]
     pub fn new(position: [f64; 3], xyzw: [f64; 4], origin: [f64; 3]) -> Self {
         let [x, y, z] = [0, 1, 2].map(|k| Dd::between(origin[k], position[k]));
@@ -259,19 +259,19 @@ impl Place {
         }
     }
 
-    /// A direction of the body's frame.
+    /// Rotates a direction from the body's frame.
     #[must_use]
     pub fn turned(&self, v: &V3) -> V3 {
         self.with_axis(v, false)
     }
 
-    /// A direction seen from the body's frame.
+    /// Rotates a direction into the body's frame.
     #[must_use]
     pub fn turned_back(&self, v: &V3) -> V3 {
         self.with_axis(v, true)
     }
 
-    /// A point of the body's frame.
+    /// Maps a point from the body's frame.
     #[must_use]
     pub fn point(&self, p: &V3) -> V3 {
         self.turned(p) + self.at
@@ -287,7 +287,7 @@ impl Place {
         *v + q.cross(&inner).scaled(Dd::from(2.0) / square)
     }
 
-    /// Whether another place is turned by the very same numbers.
+    /// Whether another pose has exactly the same quaternion.
     #[must_use]
     pub fn turned_as(&self, other: &Self) -> bool {
         self.turn == other.turn

@@ -1,13 +1,13 @@
-//! What is wrong with an answer, if anything: an interval and a verdict against the truth.
+//! Judges an answer: its interval and its verdict, against the truth.
 //!
-//! In: a [`Truth`], what was published. Out: a [`Judgement`]. Pure, so that a wrong answer can be made up and is
-//! caught.
+//! In: a [`Truth`], and what was published. Out: a [`Judgement`]. It depends on nothing else, so that tests can show
+//! that made-up wrong answers are caught.
 
 use super::dd::Dd;
 use super::truth::Truth;
 use crate::wire::Verdict;
 
-/// What was published of a pair.
+/// The published answer for a pair.
 #[derive(Clone, Copy, Debug)]
 pub struct Answer {
     /// Lower end of the interval, metres.
@@ -20,29 +20,29 @@ pub struct Answer {
     pub verdict: Verdict,
 }
 
-/// What is to be said of an answer.
+/// The findings about an answer.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[allow(
     clippy::struct_excessive_bools,
     reason = "one independent finding each"
 )]
 pub struct Judgement {
-    /// The interval does not hold the truth.
+    /// The interval excludes the truth.
     pub excluded: bool,
-    /// The verdict is not the truth, and 0 is not within the rounding of the interval.
+    /// The verdict is not the truth; a collision is wrong only if 0 is outside of the interval.
     pub wrong: bool,
-    /// Said to touch, which is right within the rounding of the interval only (law 3.4).
+    /// A collision where the truth is apart and 0 is in the interval: right only within rounding (law 3.4).
     pub touching: bool,
-    /// No verdict, although nothing limited the work.
+    /// Undecided, although nothing limited the work.
     pub open: bool,
-    /// Distance of the best estimate from the truth, metres; where there is no estimate, of the interval's farther end,
-    /// which may be without end; NaN: the truth is not known.
+    /// Distance of the best estimate from the truth, metres; without an estimate that of the interval's farther end,
+    /// which may be infinite. NaN: the truth is not known exactly.
     pub error_m: f64,
     /// Width of the interval, metres.
     pub width_m: f64,
 }
 
-/// Holds an answer against the truth.
+/// Compares an answer with the truth.
 #[must_use]
 pub fn judge(truth: &Truth, answer: &Answer) -> Judgement {
     let (min, max) = (Dd::from(answer.min_m), Dd::from(answer.max_m));
@@ -59,7 +59,7 @@ pub fn judge(truth: &Truth, answer: &Answer) -> Judgement {
     };
     let known = truth.low.filter(|low| *low == truth.high);
     let off = |value: f64| match known {
-        // What is subtracted from an end that there is not is no number.
+        // `Dd` arithmetic with an infinite end would give NaN.
         Some(_) if value.is_infinite() => f64::INFINITY,
         Some(gap) => (Dd::from(value) - gap).abs().near(),
         None => f64::NAN,

@@ -1,7 +1,7 @@
-//! Stiff and extreme cases: families swept along one parameter over many decades, played through the engine, each
-//! answer held against a truth in twice the precision ([`truth`]) and beside what plain parry says.
+//! Stiff and extreme cases: families swept along one parameter over many decades and run through the engine. Each
+//! answer is compared with a truth in twice the precision ([`truth`]), and shown beside that of plain parry.
 //!
-//! In: names of families. Out: a [`Report`]: every point, and a summary a family.
+//! In: families. Out: a [`Report`]: every point, and one summary per family.
 
 pub mod dd;
 pub mod families;
@@ -20,73 +20,73 @@ use crate::error::Result;
 use families::Family;
 use play::{Point, play};
 
-/// All that was found out.
+/// All results.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// Version of sweepd.
     pub version: &'static str,
-    /// Intervals that do not hold the truth.
+    /// Number of intervals that exclude the truth.
     pub excluded: u64,
-    /// Verdicts that are not the truth.
+    /// Number of verdicts that are not the truth.
     pub wrong: u64,
     /// The families.
     pub families: Vec<Found>,
 }
 
-/// A family, and what came of it.
+/// A family and its results.
 #[derive(Clone, Debug, Serialize)]
 pub struct Found {
     /// Its name.
     pub family: &'static str,
     /// What is stiff or extreme about it.
     pub about: &'static str,
-    /// What its parameter is, with its unit.
+    /// Its parameter, with the unit.
     pub parameter: &'static str,
-    /// The sum of its points.
+    /// Summary of its points.
     pub summary: Summary,
-    /// By kind, then by parameter.
+    /// Sorted by kind, then by parameter.
     pub points: Vec<Point>,
 }
 
-/// The sum of a family's points.
+/// Summary of a family's points.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Summary {
-    /// Points.
+    /// Number of points.
     pub cases: u64,
-    /// Ticks and pairs that were judged.
+    /// Number of judged answers, one per tick and pair.
     pub answers: u64,
-    /// Greatest error in parts of its tolerance, as an error in parts of the size.
+    /// The error that is greatest relative to its tolerance, in parts of the size.
     pub worst_error: Option<f64>,
-    /// What that error is meant to stay below.
+    /// The tolerance of that error.
     pub tolerance: Option<f64>,
-    /// The kind of pair at which it occurs.
+    /// The kind of pair at which that error occurs.
     pub worst_kind: Option<&'static str>,
-    /// The parameter at which it occurs.
+    /// The parameter at which that error occurs.
     pub worst_value: Option<f64>,
-    /// Points with a greater error than the tolerance, or left open.
+    /// Number of points with an error above the tolerance, or with a pair left open.
     pub beyond: u64,
-    /// Those of them whose depth is bounded and not estimated: the error is of the interval's farther end, and no limit
-    /// of what is proved.
+    /// Those of them whose depth is bounded and not estimated: their error is that of the interval's farther end, and
+    /// is no flaw of the proof.
     pub beyond_bounded: u64,
-    /// Pairs left open although nothing limited the work.
+    /// Number of pairs left open although nothing limited the work.
     pub open: u64,
-    /// Intervals that do not hold the truth.
+    /// Number of intervals that exclude the truth.
     pub excluded: u64,
-    /// Verdicts that are not the truth.
+    /// Number of verdicts that are not the truth.
     pub wrong: u64,
-    /// Said to touch where the truth is apart by less than rounding.
+    /// Number of answers of touching where the truth is apart by less than rounding.
     pub touching: u64,
-    /// Verdict changes from tick to tick, where the truth can be told from touching.
+    /// Number of verdict changes from tick to tick, counted where the truth is clear of touching.
     pub changes: u64,
-    /// The same of the truth.
+    /// Number of changes of the truth, counted likewise.
     pub changes_true: u64,
     /// Longest narrow phase of one tick, nanoseconds.
     pub slowest_ns: u64,
     /// Most work units of one tick.
     pub units_max: u64,
-    /// Points that plain parry was asked.
+    /// Number of points at which plain parry was called.
     pub raw_cases: u64,
-    /// Points with a wrong sign, or without an answer, of plain parry.
+    /// Number of points at which plain parry had a wrong sign, or no answer.
     pub raw_wrong: u64,
     /// Greatest error of plain parry, in parts of the size.
     pub raw_worst_error: Option<f64>,
@@ -100,9 +100,9 @@ impl Report {
     }
 }
 
-/// Plays families.
+/// Runs families.
 ///
-/// * `progress` - told before each case: how many are done, of how many, and of which family; says whether to go on.
+/// * `progress` - called before each case with the number done, the total and the family; returns whether to go on.
 /// * returns - `None`: stopped.
 ///
 /// # Errors

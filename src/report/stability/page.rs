@@ -6,7 +6,7 @@ use super::{Found, Report};
 use crate::report::plot::{Axis, Plot, Series};
 use crate::report::sheet::{escaped, figure, must_be_0, page, table};
 
-/// The page.
+/// The report as a page.
 #[must_use]
 pub fn html(report: &Report) -> String {
     let cases: u64 = report.families.iter().map(|f| f.summary.cases).sum();
@@ -84,14 +84,15 @@ fn row(found: &Found) -> Vec<String> {
     ]
 }
 
-/// Errors below this are drawn as 0, in parts of the size: a hundredth of what f64 rounds off.
+/// Errors below this are drawn as 0, in parts of the size: a hundredth of the rounding error of f64.
 const NOTHING: f64 = 1e-18;
 
 fn drawn(error: f64) -> f64 {
     if error < NOTHING { 0.0 } else { error }
 }
 
-/// Errors of each parameter: the greatest and the middle one of all kinds, the widest interval, parry's greatest.
+/// The plot of a family, by parameter: the greatest and the median error of all kinds, the widest interval, and parry's
+/// greatest error.
 fn plot(found: &Found) -> String {
     let mut values: Vec<f64> = found.points.iter().map(|point| point.value).collect();
     values.sort_by(f64::total_cmp);

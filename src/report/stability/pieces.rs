@@ -1,23 +1,23 @@
-//! Polytopes with a ball rolled around them, and the direction that parts two of them most.
+//! Polytopes with a radius, and the direction that separates two of them most.
 //!
-//! In: shapes at places. Out: corners, edges and normals in [`Dd`], and the gap of two.
+//! In: shapes at poses. Out: corners, edges and normals in [`Dd`], and the gap of two polytopes.
 
 use super::dd::{Dd, Place, V3};
 use crate::shape::ShapeSpec;
 
-/// The hull of corners with a ball rolled around it.
+/// The convex hull of corners, expanded by a radius.
 pub(super) struct Piece {
     corners: Vec<V3>,
-    /// A point and a unit direction each.
+    /// A point and the unit direction of each edge.
     edges: Vec<(V3, V3)>,
-    /// Different unit directions of edges.
+    /// Unit directions of the edges; for a box each only once.
     ways: Vec<V3>,
     normals: Vec<V3>,
     margin: Dd,
 }
 
 impl Piece {
-    /// * `edges`, `faces` - places of corners; more of them than there are do no harm.
+    /// * `edges`, `faces` - indices of corners; they may contain more than the edges and faces of the hull.
     fn new(corners: Vec<V3>, edges: &[(usize, usize)], faces: &[[usize; 3]], margin: f64) -> Self {
         let way = |&(i, j): &(usize, usize)| {
             let way = (corners[j] - corners[i]).unit()?;
@@ -77,7 +77,7 @@ impl Piece {
         )
     }
 
-    /// The hull of few points: every pair may be an edge, every three a face.
+    /// The hull of few points: every pair may be an edge, every triple a face.
     fn hull(place: &Place, points: &[[f64; 3]]) -> Self {
         let n = points.len();
         let corners = points.iter().map(|p| place.point(&V3::from(*p))).collect();
@@ -92,7 +92,7 @@ impl Piece {
     }
 }
 
-/// The pieces of a shape; `None`: it has none of this kind.
+/// The pieces of a shape; `None`: it is no union of polytopes with a radius.
 pub(super) fn pieces((spec, place): &(&ShapeSpec, Place)) -> Option<Vec<Piece>> {
     Some(match spec {
         ShapeSpec::Sphere { radius } => vec![Piece::line(place, 0.0, *radius)],
@@ -117,7 +117,7 @@ pub(super) fn pieces((spec, place): &(&ShapeSpec, Place)) -> Option<Vec<Piece>> 
     })
 }
 
-/// The greatest `f` over all directions that it can be greatest at.
+/// The greatest `f` (see `truth`) over all directions that may be the best one.
 pub(super) fn of_pieces(a: &Piece, b: &Piece) -> Dd {
     let mut ways: Vec<V3> = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
         .map(V3::from)
@@ -138,7 +138,7 @@ pub(super) fn of_pieces(a: &Piece, b: &Piece) -> Dd {
     for u in &a.ways {
         b.ways.iter().for_each(|v| offer(u.cross(v)));
     }
-    // Flat things in one plane or on one line: across an edge within the plane, across the line.
+    // Flat pieces in one plane or on one line: also directions across an edge within the plane, or across the line.
     for u in a.ways.iter().chain(&b.ways) {
         a.normals
             .iter()
@@ -152,7 +152,7 @@ pub(super) fn of_pieces(a: &Piece, b: &Piece) -> Dd {
     best(a, b, &ways) - a.margin - b.margin
 }
 
-/// The greatest `f`: in f64 first, and what cannot be told apart there again in full.
+/// The greatest `f`: in f64 first; directions that f64 cannot rank are computed again in full precision.
 fn best(a: &Piece, b: &Piece, ways: &[V3]) -> Dd {
     let near = |piece: &Piece| -> Vec<[f64; 3]> {
         let corners = piece.corners.iter();
@@ -187,7 +187,7 @@ fn best(a: &Piece, b: &Piece, ways: &[V3]) -> Dd {
         .fold(Dd::from(f64::NEG_INFINITY), Dd::max)
 }
 
-/// `f` of a direction and of its opposite, the greater one.
+/// The greater `f` of a direction and its opposite.
 fn exact(a: &Piece, b: &Piece, n: &V3) -> Dd {
     let ends = |piece: &Piece| {
         let all = || piece.corners.iter().map(|p| n.dot(p));

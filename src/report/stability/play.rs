@@ -1,7 +1,7 @@
-//! Plays a case: through an engine as the daemon has it, unlimited, tick by tick; each pair's answer against its truth.
+//! Runs a case through an engine as the daemon has it, without a limit, and judges each pair's answer in each tick.
 //!
-//! In: a [`Case`]. Out: a [`Point`], which is its worst tick and pair. Frames go through admission, broad phase and
-//! publishing, so that what is judged is what a client reads.
+//! In: a [`Case`]. Out: a [`Point`], which shows the worst tick and pair. Frames go through admission, broad phase and
+//! publishing, so that the judged rows are those that a client reads.
 
 use std::sync::Arc;
 
@@ -19,64 +19,67 @@ use crate::report::rig::Rig;
 use crate::time::{Budget, Clock, SystemClock};
 use crate::wire::{PairRow, Stage, Verdict, pair_flags};
 
-/// Error that a pair without a round part across an axis is meant to stay below, in parts of its size: the rounding
-/// that its interval allows for (some 64 units of roundoff) and what its best estimate may differ within it.
+/// Tolerance of the error of a pair without cylinders and cones, in parts of its size: the rounding that its interval
+/// allows for (some 64 units of roundoff), and how far its best estimate may be off within it.
 pub const TOLERANCE: f64 = 1e-13;
-/// The same of cylinders and cones: their depths end where the next bit would cost as much as all before it, at some
-/// 1e-7; wider than this is not called finished.
+/// Tolerance for cylinders and cones: their depth search ends where the next bit would cost as much as all before it,
+/// at some 1e-7; an interval that is wider than this does not count as finished.
 pub const TOLERANCE_ROUND: f64 = 1e-6;
 
-/// Of times of impact, in parts of the way: a touch is bracketed as closely.
+/// Tolerance of times of impact, in parts of the way: a touch is bracketed as closely.
 pub const TOLERANCE_IMPACT: f64 = 1e-9;
 /// One point of a family: its worst tick and pair.
 #[derive(Clone, Debug, Serialize)]
 pub struct Point {
-    /// What kind of pair.
+    /// Kind of the pair.
     pub kind: &'static str,
     /// The family's parameter.
     pub value: f64,
-    /// Ticks and pairs that were judged.
+    /// Number of judged answers, one per tick and pair.
     pub answers: u64,
-    /// True gap at the worst place, metres; `null`: an overlap of unknown depth. Of impacts: the share of the way.
+    /// True gap at the worst tick and pair, metres; `null`: an overlap of unknown depth. For impacts: the share of the
+    /// way.
     pub truth: Option<f64>,
-    /// The interval there, in the same unit; an end that is not known is `null`.
+    /// Lower end of the interval there, in the same unit; `null`: no known end.
     pub gap_min: Option<f64>,
-    /// See `gap_min`.
+    /// Upper end, likewise.
     pub gap_max: Option<f64>,
     /// Best estimate there.
     pub best: Option<f64>,
-    /// What errors are told in parts of, metres; of impacts 1.
+    /// The size that errors are given in parts of, metres; 1 for impacts.
     pub size: f64,
     /// Greatest error of the best estimate, or of the interval's farther end where there is none, in parts of the size;
-    /// `null`: no truth to hold it against, or without end.
+    /// `null`: no truth to compare with, or infinite.
     pub error: Option<f64>,
-    /// Greatest width of an interval whose truth is known, in parts of the size; `null`: of none, or without end.
+    /// Greatest width of an interval whose truth is known, in parts of the size; `null`: there is none, or it is
+    /// infinite.
     pub width: Option<f64>,
-    /// What the error is meant to stay below.
+    /// Tolerance of the error.
     pub tolerance: f64,
-    /// Verdict at the worst place.
+    /// Verdict at the worst tick and pair.
     pub verdict: String,
-    /// Intervals that do not hold the truth.
+    /// Number of intervals that exclude the truth.
     pub excluded: u64,
-    /// Verdicts that are not the truth.
+    /// Number of verdicts that are not the truth.
     pub wrong: u64,
-    /// Pairs left open although nothing limited the work.
+    /// Number of pairs left open although nothing limited the work.
     pub open: u64,
-    /// Said to touch where the truth is apart by less than rounding.
+    /// Number of answers of touching where the truth is apart by less than rounding.
     pub touching: u64,
-    /// Verdict changes from tick to tick.
+    /// Number of verdict changes from tick to tick, not counting ticks in which the truth is within the tolerance of 0.
     pub changes: u64,
-    /// The same of the truth, passed over where it is nearer to 0 than the rounding.
+    /// Number of changes of the truth, counted likewise.
     pub changes_true: u64,
     /// Longest narrow phase of a tick, nanoseconds.
     pub time_ns: u64,
     /// Most work units of a tick.
     pub units: u64,
-    /// Error of plain parry at the same poses, in parts of the size; `null`: it gave no answer, or was not asked.
+    /// Error of plain parry at the same poses, in parts of the size; `null`: it gave no answer, or was not called.
     pub raw_error: Option<f64>,
-    /// Whether plain parry was asked.
+    /// Whether plain parry was called.
     pub raw_asked: bool,
-    /// Wrong sign, or none although asked, of plain parry: by more than the tolerance.
+    /// Number of missing answers of plain parry, and of wrong signs where the truth is farther from 0 than the
+    /// tolerance.
     pub raw_wrong: u64,
 }
 
@@ -87,7 +90,7 @@ impl Point {
         self.excluded + self.wrong > 0
     }
 
-    /// Whether the estimate is farther off than it is meant to be, or a pair was left open.
+    /// Whether the error exceeds its tolerance, or a pair was left open.
     #[must_use]
     pub fn is_beyond(&self) -> bool {
         self.open > 0 || self.error.is_some_and(|error| error > self.tolerance)
@@ -132,7 +135,7 @@ impl Point {
         }
     }
 
-    /// Takes one answer in; the worst one is shown.
+    /// Adds one answer; the point shows the worst one.
     fn take(&mut self, truth: &Truth, answer: &Answer, found: &Judgement, size: f64) {
         self.answers += 1;
         self.excluded += u64::from(found.excluded);
@@ -155,7 +158,7 @@ impl Point {
         if worse {
             self.error = error;
         }
-        // Of an overlap of unknown depth the interval is a bound, and no measure of an error.
+        // For an overlap of unknown depth the interval is a bound, and its width measures no error.
         if truth.low.is_some() {
             let most = self.width.unwrap_or(0.0);
             self.width = Some(most.max(found.width_m / size)).filter(|width| width.is_finite());
@@ -169,17 +172,17 @@ impl Point {
             return;
         };
         let error = (Dd::from(told) - low).abs().near() / size;
-        // A sign is held against it only where the truth is farther from 0 than its own rounding could be.
+        // The sign only counts where the truth is farther from 0 than its own rounding could be.
         let clear = low.abs().near() > self.tolerance * size;
         self.raw_wrong += u64::from(clear && (told > 0.0) != (low > Dd::ZERO));
         self.raw_error = Some(self.raw_error.unwrap_or(0.0).max(error));
     }
 }
 
-/// Plays a case.
+/// Runs a case.
 ///
 /// # Errors
-/// `Error::Scene` for a case that the engine refuses: a fault of the case.
+/// `Error::Scene` for a case that the engine refuses, or whose truth is unknown: a fault of the case.
 pub fn play(case: &Case) -> Result<Point> {
     let truths = truths(case)?;
     let scene = scene(case, &truths);
@@ -233,7 +236,7 @@ fn truths(case: &Case) -> Result<Vec<Vec<Truth>>> {
     case.ticks.iter().map(tick).collect()
 }
 
-/// What was published of a pair; where no row is: it is apart by more than what is reported.
+/// The published answer for a pair; without a row the pair is apart by more than `beyond_m`.
 fn answer(rows: &[PairRow], (i, j): (usize, usize), beyond_m: f64) -> Answer {
     let id = |at: usize| at as u64 + 1;
     let ids = (id(i.min(j)), id(i.max(j)));
@@ -255,7 +258,7 @@ fn answer(rows: &[PairRow], (i, j): (usize, usize), beyond_m: f64) -> Answer {
     )
 }
 
-/// A time of impact: its interval is to hold the share of the way at which the two touch first.
+/// Judges a time of impact: its interval must contain the share of the way at which the two first touch.
 fn impact(point: &mut Point, row: Option<&PairRow>, toi: Dd) {
     let has = |flag: u8| row.is_some_and(|row| row.flags & flag != 0);
     let (hit, open) = (has(pair_flags::SWEPT_HIT), has(pair_flags::SWEPT_OPEN));
@@ -283,7 +286,7 @@ fn impact(point: &mut Point, row: Option<&PairRow>, toi: Dd) {
     verdict.clone_into(&mut point.verdict);
 }
 
-/// Counts changes of the verdict, and those of the truth where it can be told from touching.
+/// Counts changes of the verdict and of the truth, in ticks in which the truth can be told from touching.
 fn changes(
     point: &mut Point,
     last: &mut [Option<bool>; 2],
@@ -304,7 +307,7 @@ fn changes(
     }
 }
 
-/// Plain parry's gap at these poses; `None`: it is not asked of bodies of several shapes.
+/// Plain parry's gap at these poses; outer `None`: bodies with several shapes are not asked.
 fn plain(case: &Case, tick: usize, (i, j): (usize, usize)) -> Option<Option<f64>> {
     let placed = |at: usize| {
         let [(shape, off)] = case.actors[at].parts.as_slice() else {

@@ -1,4 +1,4 @@
-//! The scene that a case is played in. In: a [`Case`]. Out: what an engine is made of.
+//! The scene in which a case runs. In: a [`Case`]. Out: the scene, the shapes and the rows for an engine.
 
 use super::stage::{Actor, Asked, Case, Pos};
 use super::truth::Truth;
@@ -10,13 +10,14 @@ use crate::shape::{Library, ShapeSpec};
 use crate::wire::TransformRow;
 use crate::world::{Parts, PlacedShape};
 
-/// How far bodies are told apart: well beyond every gap that is asked, so that each of them has a row.
+/// The distance within which a pair is reported, metres.
 pub(super) fn reach_of(scene: &Scene, (i, j): (usize, usize)) -> f64 {
     let of = |at: usize| scene.bodies[at].report_within_m;
     of(i).max(of(j))
 }
 
-/// The scene of a case: one source, and bodies that are reported well beyond every gap that is asked.
+/// The scene of a case: one source; bodies are reported well beyond every true gap, so that each pair has a row. For
+/// impacts the distance is 0.
 pub(super) fn scene(case: &Case, truths: &[Vec<Truth>]) -> Scene {
     let farthest = truths.iter().flatten().map(|truth| truth.high.near());
     let most = farthest.fold(0.0_f64, f64::max);
@@ -56,7 +57,7 @@ fn body(id: u64, actor: &Actor, report_within_m: f64) -> BodySpec {
     }
 }
 
-/// The shapes of its bodies.
+/// Builds the shapes of its bodies.
 pub(super) fn shapes(scene: &Scene) -> Result<Vec<Parts>> {
     let built = scene.build_shapes(&mut Library::new(), |_, _| {})?;
     let placed = scene.bodies.iter().zip(built.shapes).map(|(body, shapes)| {

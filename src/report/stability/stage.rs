@@ -1,4 +1,4 @@
-//! What a case is made of: bodies, where they are in each tick, and which pairs are asked of.
+//! The parts of a case: bodies, their poses in each tick, and the pairs to judge.
 
 use crate::shape::ShapeSpec;
 
@@ -8,14 +8,14 @@ use super::truth::Truth;
 /// A body of a case.
 #[derive(Clone, Debug)]
 pub struct Actor {
-    /// Its shapes, each at a point of the body's frame and not turned there.
+    /// Its shapes, each at a point of the body's frame and not rotated.
     pub parts: Vec<(ShapeSpec, [f64; 3])>,
     /// Whether it is swept between its poses.
     pub continuous: bool,
 }
 
 impl Actor {
-    /// A body of one shape.
+    /// A body with one shape.
     #[must_use]
     pub fn of(shape: ShapeSpec) -> Self {
         Self {
@@ -30,12 +30,12 @@ impl Actor {
 pub struct Pos {
     /// Metres.
     pub t: [f64; 3],
-    /// x, y, z, w; as long as admission takes it.
+    /// x, y, z, w; of any length that admission accepts.
     pub q: [f64; 4],
 }
 
 impl Pos {
-    /// Not turned.
+    /// A pose without rotation.
     #[must_use]
     pub fn at(t: [f64; 3]) -> Self {
         Self {
@@ -45,21 +45,21 @@ impl Pos {
     }
 }
 
-/// What a case asks, where it is not the gap as [`super::truth::gap`] finds it.
+/// The question of a case.
 #[derive(Clone, Copy, Debug)]
 pub enum Asked {
-    /// The gap, computed from the poses of each tick.
+    /// The gap, computed from the poses of each tick by [`super::truth::gap`].
     Gap,
-    /// The gap, known from how the case was made.
+    /// The gap, known from the construction of the case.
     Known(Truth),
-    /// When two bodies touch first on their way between the first tick's poses (0) and the second's (1).
+    /// The share of the way from the first tick's poses (0) to the second's (1) at which two bodies first touch.
     Impact(Dd),
 }
 
 /// A case: one point of a family's plot.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// What kind of pair it is, the same along a family's parameter.
+    /// Kind of the pair, the same along a family's parameter.
     pub kind: &'static str,
     /// The family's parameter.
     pub value: f64,
@@ -67,9 +67,9 @@ pub struct Case {
     pub actors: Vec<Actor>,
     /// Poses of all bodies, tick by tick.
     pub ticks: Vec<Vec<Pos>>,
-    /// Places of the bodies of each pair.
+    /// Indices of the bodies of each pair.
     pub pairs: Vec<(usize, usize)>,
-    /// What is asked.
+    /// The question.
     pub asked: Asked,
 }
 
@@ -87,8 +87,8 @@ impl Case {
         }
     }
 
-    /// How large a pair is: how far both reach from their origins, and how far these are apart; errors are told in
-    /// parts of it. Metres.
+    /// Size of a pair, metres: the reach of both bodies from their origins, plus the distance of the origins. Errors
+    /// are given in parts of it.
     #[must_use]
     pub fn size_m(&self, tick: usize, (i, j): (usize, usize)) -> f64 {
         let poses = &self.ticks[tick];
@@ -98,7 +98,7 @@ impl Case {
     }
 }
 
-/// How far a part reaches from its body's origin at most, metres; a half-space: 0.
+/// Upper bound of a part's reach from its body's origin, metres; 0 for a half-space or a height field.
 fn reach_m((shape, at): &(ShapeSpec, [f64; 3])) -> f64 {
     let norm = |p: &[f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();
     let farthest = |points: &[[f64; 3]]| points.iter().map(norm).fold(0.0, f64::max);
@@ -126,7 +126,7 @@ fn reach_m((shape, at): &(ShapeSpec, [f64; 3])) -> f64 {
     own + norm(at)
 }
 
-/// Whether a shape has a part that is round across an axis: then depths end at a part in a million, else at rounding.
+/// Whether a body has a cylinder or a cone: depths are then found to a part in a million, else to rounding.
 #[must_use]
 pub fn is_round(actor: &Actor) -> bool {
     let round =

@@ -1,28 +1,29 @@
-//! The truth of a case: the gap of two placed solids as law 3.2 means it, from the numbers that the engine is given,
-//! in [`Dd`]: sure to some 1e-28 of the sizes. It shares no code with the engine.
+//! The truth of a case: the gap of two placed solids as law 3.2 defines it, computed from the engine's input in [`Dd`],
+//! and accurate to some 1e-28 of the sizes. It shares no code with the engine.
 //!
-//! How: `f(n)`, how far the planes across a direction keep two convex solids apart, is at most their gap for any `n`,
-//! and is it for the best one. Of two polytopes with radii that is a face's normal, a normal of two edges, or the way
-//! between two corners or a corner and an edge: all are tried. Round solids have closed forms, where there is one:
-//! ball against cylinder and cone, any solid against a half-space, upright cylinders and boxes, and cylinders whose
-//! middles lie on the common perpendicular of their axes. What has none is no case.
+//! Method: `f(n)`, the distance by which planes across a direction `n` separate two convex solids, is at most their gap
+//! for any `n`, and equal to it for the best one. For two polytopes with radii the best one is a face's normal, a
+//! normal of two edges, or the way between two corners or between a corner and an edge: all are tried. Round solids
+//! have closed forms in some cases: ball against cylinder or cone, any solid against a half-space, upright cylinders
+//! and boxes, and cylinders whose centres lie on the common perpendicular of their axes. A pair without a closed form
+//! is no case.
 
 use super::dd::{Dd, Place, V3};
 use super::pieces::{of_pieces, pieces};
 use super::stage::{Actor, Pos};
 use crate::shape::ShapeSpec;
 
-/// Bounds of a true gap, metres: one number twice where it is known.
+/// Bounds of a true gap, metres; they are equal if the gap is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
-    /// Not above it; `None`: an overlap of unknown depth.
+    /// The lower bound; `None`: an overlap of unknown depth.
     pub low: Option<Dd>,
-    /// Not below it.
+    /// The upper bound.
     pub high: Dd,
 }
 
 impl Truth {
-    /// A gap that is known.
+    /// A known gap.
     #[must_use]
     pub fn is(gap: Dd) -> Self {
         Self {
@@ -41,7 +42,7 @@ impl Truth {
 
 /// The truth of two bodies: the least over their shape pairs.
 ///
-/// * returns - `None`: no closed form here.
+/// * returns - `None`: there is no closed form.
 #[must_use]
 pub fn gap(a: &Actor, at_a: &Pos, b: &Actor, at_b: &Pos) -> Option<Truth> {
     let (place_a, place_b) = (
@@ -59,7 +60,7 @@ pub fn gap(a: &Actor, at_a: &Pos, b: &Actor, at_b: &Pos) -> Option<Truth> {
     least
 }
 
-/// The place of a part that is not turned in its body.
+/// The pose of a part that is not rotated in its body.
 fn moved(place: &Place, by: [f64; 3]) -> Place {
     let mut moved = *place;
     moved.at = place.point(&V3::from(by));
@@ -88,7 +89,7 @@ fn of_shapes(a: &At<'_>, b: &At<'_>) -> Option<Truth> {
             let least = all.map(|(p, q)| of_pieces(p, q)).reduce(Dd::min)?;
             let solid = is_solid_mesh(a.0) || is_solid_mesh(b.0);
             Some(Truth {
-                // Of solids of triangles that cross the depth is not that of the triangles.
+                // Where solid meshes overlap, their depth is not that of the triangles.
                 low: (!solid || least >= Dd::ZERO).then_some(least),
                 high: if solid { least.max(Dd::ZERO) } else { least },
             })
@@ -100,7 +101,7 @@ fn is_solid_mesh(spec: &ShapeSpec) -> bool {
     matches!(spec, ShapeSpec::Trimesh { solid, .. } if *solid != Some(false))
 }
 
-/// Above a plane: what reaches lowest.
+/// The gap to a half-space: the height of the shape's lowest point above the plane.
 fn over((normal, offset): (&[f64; 3], f64), plane: &Place, (spec, place): &At<'_>) -> Option<Dd> {
     let up = plane.turned(&V3::from(*normal).unit()?);
     let height = up.dot(&(place.at - plane.at)) - Dd::from(offset);
@@ -175,7 +176,7 @@ fn profile((spec, place): &At<'_>, point: &V3) -> Option<Dd> {
     }
 }
 
-/// How far a point of the plane is from a segment.
+/// Distance of a point of the plane from a segment.
 fn segment(p: (Dd, Dd), from: (Dd, Dd), to: (Dd, Dd)) -> Dd {
     let (dx, dy) = (to.0 - from.0, to.1 - from.1);
     let (px, py) = (p.0 - from.0, p.1 - from.1);
@@ -186,7 +187,7 @@ fn segment(p: (Dd, Dd), from: (Dd, Dd), to: (Dd, Dd)) -> Dd {
     (x * x + y * y).sqrt()
 }
 
-/// The gap of two products of the same two kinds of things: apart in both ways, or not.
+/// The gap of two products of sets, from the gaps `u` and `v` of their factors.
 fn corner(u: Dd, v: Dd) -> Dd {
     if u > Dd::ZERO && v > Dd::ZERO {
         (u * u + v * v).sqrt()
@@ -195,7 +196,7 @@ fn corner(u: Dd, v: Dd) -> Dd {
     }
 }
 
-/// Cylinders and boxes that are turned by the very same numbers: what stands upright.
+/// The gap of cylinders and boxes with exactly equal orientations; `None`: for other pairs.
 fn upright(a: &At<'_>, b: &At<'_>) -> Option<Dd> {
     if !a.1.turned_as(&b.1) {
         return None;
@@ -240,8 +241,8 @@ fn upright(a: &At<'_>, b: &At<'_>) -> Option<Dd> {
     Some(corner(lateral, z.abs() - tall))
 }
 
-/// Cylinders no lower than wide whose middles lie on the common perpendicular of their axes: no direction parts them
-/// more than that one, because each is as thin across its axis as anywhere.
+/// The gap of two cylinders whose centres lie on the common perpendicular of their axes, if none is lower than wide: no
+/// other direction separates them more, because each is thinnest across its axis. `None`: for other pairs.
 fn crossed(a: &At<'_>, b: &At<'_>) -> Option<Dd> {
     let size = |spec: &ShapeSpec| match spec {
         ShapeSpec::Cylinder {

@@ -1,4 +1,4 @@
-//! Near-parallel things: edges, faces and axes; needles, slivers and discs; pegs in their holes.
+//! Near-parallel edges, faces and axes; needles, slivers and discs; pegs in their holes.
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -13,7 +13,7 @@ const X: [f64; 3] = [1.0, 0.0, 0.0];
 const Y: [f64; 3] = [0.0, 1.0, 0.0];
 const Z: [f64; 3] = [0.0, 0.0, 1.0];
 
-/// Gaps at which near-parallel things are asked, metres.
+/// Gaps of the near-parallel pairs, metres.
 const GAPS_M: [f64; 2] = [1e-3, -1e-3];
 
 pub(super) fn parallel() -> Vec<Case> {
@@ -60,7 +60,7 @@ pub(super) fn parallel() -> Vec<Case> {
     cases
 }
 
-/// Two cylinders side by side, their axes at an angle, their middles on the common perpendicular.
+/// Two cylinders side by side, with their axes at an angle and their centres on the common perpendicular.
 fn axes(angle: f64, apart_m: f64) -> Case {
     let can = || Actor::of(cylinder(0.2, 0.5));
     let other = Pos {
@@ -178,7 +178,7 @@ pub(super) fn peg() -> Vec<Case> {
     cases
 }
 
-/// A square hole between four boxes; half of its side, metres.
+/// A square hole between four boxes; `half_m` is half of its side.
 fn of_boxes(half_m: f64) -> Actor {
     let wall = |x: f64, y: f64| (cuboid(0.05, 0.3, 0.1), [x, y, 0.0]);
     let across = |y: f64| (cuboid(0.3, 0.05, 0.1), [0.0, y, 0.0]);
@@ -193,7 +193,7 @@ fn of_boxes(half_m: f64) -> Actor {
     }
 }
 
-/// A square hole through a solid mesh; half of its side, metres.
+/// A square hole through a solid mesh; `half_m` is half of its side.
 fn of_mesh(half_m: f64) -> Actor {
     let (mut vertices, _) = box_faces([half_m + 0.1, half_m + 0.1, 0.1]);
     vertices.extend(box_faces([half_m, half_m, 0.1]).0);
@@ -201,7 +201,7 @@ fn of_mesh(half_m: f64) -> Actor {
     let mut quad = |a: u32, b: u32, c: u32, d: u32| faces.extend([[a, b, c], [a, c, d]]);
     for k in 0..4 {
         let next = (k + 1) % 4;
-        // Outside, inside, the ring on top, the ring below.
+        // The outer walls, the inner walls, the upper ring, the lower ring.
         quad(k, next, 4 + next, 4 + k);
         quad(8 + next, 8 + k, 12 + k, 12 + next);
         quad(4 + k, 4 + next, 12 + next, 12 + k);

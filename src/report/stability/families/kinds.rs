@@ -1,4 +1,4 @@
-//! Shapes, turns and pairs that several families take.
+//! Shapes, rotations and pairs that several families use.
 
 use nalgebra::{Quaternion, UnitQuaternion};
 
@@ -39,7 +39,7 @@ pub(super) fn cone(radius: f64, half_height: f64) -> ShapeSpec {
     }
 }
 
-/// All that is not above z = 0.
+/// The half-space z <= 0.
 pub(super) fn floor() -> ShapeSpec {
     ShapeSpec::HalfSpace {
         normal: [0.0, 0.0, 1.0],
@@ -65,7 +65,7 @@ pub(super) fn mesh(vertices: Vec<[f64; 3]>, faces: Vec<[u32; 3]>, solid: bool) -
     }
 }
 
-/// Corners of a box, and its twelve triangles, outward.
+/// Corners of a box, and its twelve triangles, which face outward.
 pub(super) fn box_faces([x, y, z]: [f64; 3]) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let corners = vec![
         [-x, -y, -z],
@@ -92,32 +92,32 @@ pub(super) fn box_faces([x, y, z]: [f64; 3]) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     (corners, faces)
 }
 
-/// A solid cube of triangles.
+/// A solid cube as a mesh of triangles.
 pub(super) fn mesh_cube(half: f64) -> ShapeSpec {
     let (vertices, faces) = box_faces([half; 3]);
     mesh(vertices, faces, true)
 }
 
-/// x, y, z, w of a turn.
+/// The quaternion x, y, z, w of a rotation.
 pub(super) fn turn(axis: [f64; 3], angle_rad: f64) -> [f64; 4] {
     let axis = Vec3::from(axis).normalize();
     let (s, c) = (angle_rad / 2.0).sin_cos();
     [axis.x * s, axis.y * s, axis.z * s, c]
 }
 
-/// The turn `b`, then `a`.
+/// The rotation `b`, followed by `a`.
 pub(super) fn then(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
     let quaternion = |q: [f64; 4]| Quaternion::new(q[3], q[0], q[1], q[2]);
     let both = (quaternion(a) * quaternion(b)).coords;
     [both.x, both.y, both.z, both.w]
 }
 
-/// Turned in no special way.
+/// A generic rotation.
 pub(super) const ANY: [f64; 4] = [0.2, -0.5, 0.3, 0.787_400_787_401_181_1];
-/// Not turned.
+/// No rotation.
 pub(super) const STILL: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
-/// Powers of ten from one to another, so many steps a decade.
+/// Powers of ten from `from` to `to`, with `steps` steps per decade.
 pub(super) fn logs(from: i32, to: i32, steps: i32) -> impl Iterator<Item = f64> + Clone {
     (from * steps..=to * steps).map(move |k| {
         let exact = k % steps == 0;
@@ -129,14 +129,14 @@ pub(super) fn logs(from: i32, to: i32, steps: i32) -> impl Iterator<Item = f64> 
     })
 }
 
-/// How far a shape that is turned so reaches down.
+/// How far a shape rotated by `q` reaches below its origin, metres.
 pub(super) fn below(shape: &ShapeSpec, q: [f64; 4]) -> f64 {
     let place = Place::new([0.0; 3], q, [0.0; 3]);
     let down = place.turned_back(&V3::from([0.0, 0.0, -1.0]));
     reach(shape, &down).map_or(0.0, |reach| reach.near())
 }
 
-/// A shape above the top of another that stands at the origin, by a gap along z.
+/// The pose of a shape above another one at the origin, whose top is at `top_m`, with a gap along z.
 pub(super) fn above(top_m: f64, shape: &ShapeSpec, q: [f64; 4], gap_m: f64) -> Pos {
     Pos {
         t: [0.0, 0.0, top_m + below(shape, q) + gap_m],
@@ -144,7 +144,7 @@ pub(super) fn above(top_m: f64, shape: &ShapeSpec, q: [f64; 4], gap_m: f64) -> P
     }
 }
 
-/// A pair: the upper one stands on the lower one's top, turned so, a little aside.
+/// A pair: the upper shape, rotated by `q` and moved by `aside`, stands on the top of the lower one.
 #[derive(Clone, Debug)]
 pub(super) struct Stand {
     pub(super) kind: &'static str,
@@ -153,7 +153,7 @@ pub(super) struct Stand {
     q: [f64; 4],
     top_m: f64,
     aside: [f64; 2],
-    /// The whole may be turned: its truth does not rest on being upright.
+    /// Whether the pair may be rotated as a whole: its truth does not need upright shapes.
     free: bool,
 }
 
@@ -189,7 +189,7 @@ impl Stand {
         }
     }
 
-    /// Poses with a gap along the axis; the whole turned in no special way where that may be.
+    /// Poses with a gap along the axis, rotated as a whole if that is allowed.
     pub(super) fn poses(&self, gap_m: f64) -> [Pos; 2] {
         let mut upper = above(self.top_m, &self.upper, self.q, gap_m);
         (upper.t[0], upper.t[1]) = (self.aside[0], self.aside[1]);
@@ -209,7 +209,7 @@ impl Stand {
     }
 }
 
-/// Both poses turned about the origin in no special way.
+/// Both poses after a generic rotation about the origin.
 fn turned(poses: [Pos; 2]) -> [Pos; 2] {
     let whole = [0.31, 0.17, -0.42, 0.83];
     let unit =
@@ -223,7 +223,7 @@ fn turned(poses: [Pos; 2]) -> [Pos; 2] {
     })
 }
 
-/// Pairs of all kinds: the lower one of size `a`, the upper one of size `b`, metres.
+/// Pairs of all kinds; the lower body has size `a`, the upper one `b`, metres.
 pub(super) fn stands(a: f64, b: f64) -> Vec<Stand> {
     let cube = || cuboid(0.5 * a, 0.5 * a, 0.5 * a);
     let brick = || cuboid(0.3 * b, 0.2 * b, 0.4 * b);

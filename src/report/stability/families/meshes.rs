@@ -1,13 +1,13 @@
-//! Solid meshes that are the same solid as a cube, with triangles of next to no height in them.
+//! Solid meshes of a cube that have triangles of nearly no height.
 
 use super::kinds::{ANY, STILL, above, ball, box_faces, cuboid, logs, mesh, mesh_cube};
 use crate::report::stability::stage::{Actor, Case, Pos};
 use crate::shape::ShapeSpec;
 
-/// A cube of which one face has a vertex more, so far from one of its edges, metres: still a cube.
+/// A cube with one more vertex in its top face, `height_m` away from an edge: the same solid.
 fn sliver_cube(height_m: f64) -> ShapeSpec {
     let (mut vertices, mut faces) = box_faces([0.5; 3]);
-    // The top: its two triangles give way to four about the new vertex.
+    // Four triangles around the new vertex replace the two of the top.
     vertices.push([-0.5 + height_m, 0.05, 0.5]);
     faces.retain(|face| face.iter().any(|&corner| corner < 4));
     faces.extend([[4, 5, 8], [5, 6, 8], [6, 7, 8], [7, 4, 8]]);

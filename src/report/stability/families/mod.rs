@@ -12,17 +12,17 @@ use super::stage::Case;
 /// A family.
 #[derive(Clone, Copy, Debug)]
 pub struct Family {
-    /// What `--family` calls it.
+    /// Its name for `--family`.
     pub name: &'static str,
     /// What is stiff or extreme about it.
     pub about: &'static str,
-    /// What its parameter is, with its unit.
+    /// Its parameter, with the unit.
     pub parameter: &'static str,
-    /// Its cases, by kind and parameter.
+    /// Its cases, each with its kind and parameter.
     pub cases: fn() -> Vec<Case>,
 }
 
-/// All of them, in the order of the report.
+/// All families, in the order of the report.
 pub const FAMILIES: &[Family] = &[
     Family {
         name: "far_origin",
@@ -134,7 +134,7 @@ pub const FAMILIES: &[Family] = &[
     },
 ];
 
-/// The family of a name.
+/// The family with this name.
 #[must_use]
 pub fn named(name: &str) -> Option<&'static Family> {
     FAMILIES.iter().find(|family| family.name == name)

@@ -1,4 +1,4 @@
-//! Stiff in time: stacks, spinning needles, vibration about touching, bullets.
+//! Cases that are stiff in time: stacks, spinning needles, vibration about touching, bullets.
 
 use std::f64::consts::PI;
 
@@ -13,7 +13,7 @@ pub(super) fn stack() -> Vec<Case> {
         .collect()
 }
 
-/// Eight bodies on a floor, each a gap above the one below.
+/// Eight bodies on a floor, each with a gap to the one below.
 fn tower(kind: &'static str, gap_m: f64, mesh: bool) -> Case {
     let mut actors = vec![Actor::of(floor())];
     let mut poses = vec![Pos::at([0.0; 3])];
@@ -55,7 +55,7 @@ pub(super) fn spin() -> Vec<Case> {
             ("capsule-box", capsule(thin_m, 0.5), post()),
             ("box-mesh", cuboid(0.5, thin_m, thin_m), mesh_cube(0.05)),
         ] {
-            // Its tip passes the post in some ticks, and misses it by little in others.
+            // The needle's tip passes the post in some ticks, and narrowly misses it in others.
             let poses = |tick: u32| {
                 let angle = f64::from(tick) * (PI + 0.13);
                 let axis = if matches!(needle, ShapeSpec::Capsule { .. }) {
@@ -91,7 +91,7 @@ pub(super) fn vibration() -> Vec<Case> {
     let mut cases = Vec::new();
     for amplitude_m in logs(-12, -3, 1) {
         for stand in stands(1.0, 1.0) {
-            // Not a period of the ticks, so that all phases come.
+            // Not a period of the ticks, so that all phases occur.
             let gap_m = |tick: u32| amplitude_m * (2.4 * f64::from(tick)).sin();
             cases.push(Case {
                 ticks: (0..48)
@@ -105,7 +105,7 @@ pub(super) fn vibration() -> Vec<Case> {
 }
 
 pub(super) fn bullet() -> Vec<Case> {
-    /// Half of the wall, metres.
+    /// Half of the wall's thickness, metres.
     const HALF_M: f64 = 5e-4;
     let mut cases = Vec::new();
     for way_m in logs(-2, 4, 2) {

@@ -1,4 +1,4 @@
-//! Coincident, nested and deep: where directions are not unique, and differences vanish.
+//! Coincident, nested and deep bodies: directions are not unique, and differences vanish.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -35,14 +35,14 @@ pub(super) fn coincident() -> Vec<Case> {
     cases
 }
 
-/// A right triangle in a plane, from `x` on.
+/// A right triangle in the plane z = 0, from `x` on.
 fn tile(x: f64, h: f64) -> ShapeSpec {
     ShapeSpec::Triangle {
         vertices: [[x, 0.0, 0.0], [x + h, 0.0, 0.0], [x, h, 0.0]],
     }
 }
 
-/// Faces, edges, corners that meet exactly: sums of these numbers round nothing off.
+/// Faces, edges and corners that meet exactly: the sums of these numbers have no rounding error.
 fn touching(h: f64) -> Vec<Case> {
     let cube = || cuboid(h, h, h);
     let solid = || mesh_cube(h);
@@ -105,7 +105,7 @@ fn touching(h: f64) -> Vec<Case> {
     ]
 }
 
-/// A body in the very place of another.
+/// A body at exactly the pose of another one.
 fn the_same(h: f64) -> Vec<Case> {
     let hull_cube = || hull(&box_faces([h; 3]).0);
     vec![
@@ -165,8 +165,8 @@ pub(super) fn nested() -> Vec<Case> {
                 at,
             ),
         ]);
-        // The deepest point of what is within lies on the far side from the nearest face of the cube, 1 m from its
-        // middle.
+        // The deepest point of the inner body is on its side away from the cube's nearest face, which is 1 m from the
+        // cube's centre.
         let deepest = Dd::from(0.3) - Dd::from(1.0) - Dd::from(r);
         for (kind, shape) in [("sphere in mesh", ball(r)), ("mesh in mesh", mesh_cube(r))] {
             cases.push(Case {
@@ -245,7 +245,7 @@ pub(super) fn denormals() -> Vec<Case> {
         5e-324, 1e-310, 1e-300, 1e-250, 1e-200, 1e-150, 1e-100, 1e-50,
     ];
     for gap_m in near.into_iter().chain(logs(-30, -15, 1)) {
-        // A corner at the origin of its own frame: only its position is above the face.
+        // A corner at the origin of its own frame: only the body's position puts it above the face.
         let corner = || ShapeSpec::Triangle {
             vertices: [[0.0; 3], [0.4, 0.3, 0.5], [-0.2, 0.3, 0.5]],
         };

@@ -1,4 +1,4 @@
-//! Far, near, large, small, and both together.
+//! Pairs that are far from the origin, nearly touching, large, small, or of very different sizes.
 
 use super::kinds::{logs, stands};
 use crate::report::stability::stage::Case;
@@ -47,7 +47,7 @@ pub(super) fn scale() -> Vec<Case> {
 }
 
 pub(super) fn size_ratio() -> Vec<Case> {
-    /// The larger one, metres.
+    /// Size of the larger body, metres.
     const HUGE_M: f64 = 1e4;
     let of = |ratio: f64| {
         let small_m = HUGE_M / ratio;
