@@ -2,15 +2,15 @@
 
 use super::Clock;
 
-/// A part of what a [`Meter`] has left, so that one job leaves something to another.
+/// A part of a [`Meter`]'s remaining budget, so that one job leaves something for another.
 #[derive(Clone, Copy, Debug)]
 pub struct Share {
-    /// Units charged when it is used up.
+    /// The count of charged units at which it is used up.
     units: u64,
     end_ns: Option<u64>,
 }
 
-/// What a [`Meter`] keeps back for a job that comes later.
+/// Budget that a [`Meter`] keeps back for a later job.
 #[derive(Clone, Copy, Debug, Default)]
 #[must_use = "what is kept back is to be released"]
 pub struct Reserve {
@@ -18,16 +18,16 @@ pub struct Reserve {
     ns: u64,
 }
 
-/// Spends a budget: counts units and, now and then, looks at the clock.
+/// Spends a budget: counts units and reads the clock at intervals.
 pub struct Meter<'a> {
     clock: &'a dyn Clock,
     deadline_ns: Option<u64>,
     units_left: u64,
     units_spent: u64,
     units_to_next_read: u64,
-    /// When the clock was last read; 0 where nothing asks for it.
+    /// Time of the last clock read; 0 if neither a deadline nor a beat needs it.
     read_ns: u64,
-    /// In units of work.
+    /// The longest pause in which only charged units were done.
     longest: Pause,
     out_of_time: bool,
     beat: Option<Beat<'a>>,
@@ -36,25 +36,25 @@ pub struct Meter<'a> {
 /// A time between two reads of the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pause {
-    /// The first of the two, monotonic nanoseconds.
+    /// Time of the first read, monotonic nanoseconds.
     pub from_ns: u64,
-    /// Nanoseconds from it to the second.
+    /// Nanoseconds from it to the second read.
     pub ns: u64,
 }
 
-/// What is done at least each `period_ns` while work goes on, between two units.
+/// A callback that is due each `period_ns` while work goes on; it is called between two units.
 struct Beat<'a> {
     next_ns: u64,
     period_ns: u64,
     call: &'a mut dyn FnMut(),
 }
 
-/// Cheap units (a box against eight others, some 150 ns each with what they wait for) between two reads of the clock
-/// (some 25 ns): at 8 the reads cost 2 %, at 32 a deadline would be passed by some six microseconds.
+/// Cheap units (a box against eight others, some 150 ns each with memory waits) between two reads of the clock (some
+/// 25 ns): at 8 the reads cost 2 %, at 32 a deadline would be passed by some six microseconds.
 const CHEAP_UNITS_PER_READ: u64 = 8;
-/// What a cheap unit may take, nanoseconds: where less is left than that for each unit between two reads, there are
-/// fewer. Out of cold memory a unit takes half a microsecond and more, two on a slow machine. With less, a deadline is
-/// passed by more; with more, the clock is read more often before it.
+/// Longest time that a cheap unit is expected to take, nanoseconds: if less is left for each unit between two reads,
+/// there are fewer units. From cold memory a unit takes half a microsecond and more, two on a slow machine. With a
+/// smaller value a deadline is passed by more; with a larger one the clock is read more often before it.
 const CHEAP_UNIT_NS: u64 = 2_000;
 
 impl std::fmt::Debug for Meter<'_> {
@@ -89,7 +89,7 @@ impl<'a> Meter<'a> {
     /// Calls `call` whenever `period_ns` has passed since `from_ns` (monotonic) or the last call, between two units.
     #[must_use]
     pub fn with_beat(mut self, from_ns: u64, period_ns: u64, call: &'a mut dyn FnMut()) -> Self {
-        // Without a deadline nobody has looked yet.
+        // Without a deadline the clock has not been read yet.
         if self.read_ns == 0 {
             self.read_ns = self.clock.monotonic_ns();
         }
@@ -118,7 +118,7 @@ impl<'a> Meter<'a> {
         self.charge_weighted(units, units);
     }
 
-    /// Charges `units` that cost as much as `weight` cheap ones: the clock is read that much sooner.
+    /// Charges `units` that cost as much as `weight` cheap ones: the clock is read sooner by as much.
     pub fn charge_weighted(&mut self, units: u64, weight: u64) {
         self.count(units);
         self.units_to_next_read = self.units_to_next_read.saturating_sub(weight);
@@ -128,8 +128,8 @@ impl<'a> Meter<'a> {
         }
     }
 
-    /// Charges `units` of costly work (an exact query, some microseconds) and reads the clock at once; returns what it
-    /// took since the clock was read before, nanoseconds, 0 without a deadline or a beat.
+    /// Charges `units` of costly work (an exact query, some microseconds) and reads the clock at once; returns the time
+    /// since the previous read, nanoseconds, or 0 without a deadline or a beat.
     pub fn charge_dear(&mut self, units: u64) -> u64 {
         self.count(units);
         let pause = self.look();
@@ -139,28 +139,28 @@ impl<'a> Meter<'a> {
         pause.ns
     }
 
-    /// Reads the clock now, after work that was not charged; whether another unit may be spent.
+    /// Reads the clock after work that was not charged; returns whether another unit may be spent.
     pub fn refresh(&mut self) -> bool {
         self.look();
         self.open()
     }
 
-    /// Whether work of about so many nanoseconds that cannot be stopped would end before the deadline.
+    /// Whether work of about `ns` nanoseconds that cannot be stopped would end before the deadline.
     #[must_use]
     pub fn has_ns(&self, ns: u64) -> bool {
         (self.deadline_ns)
             .is_none_or(|end_ns| self.clock.monotonic_ns().saturating_add(ns) < end_ns)
     }
 
-    /// Whether dear work of about so many nanoseconds is to be begun: it would end in time, by when the clock was last
-    /// read, or is the first of all. Else the meter closes.
+    /// Whether to begin costly work of about `ns` nanoseconds: it would end in time, as of the last read of the clock,
+    /// or it is the first work. Otherwise the meter closes.
     pub fn begins(&mut self, ns: u64) -> bool {
         let in_time = (self.deadline_ns).is_none_or(|end_ns| self.read_ns + ns < end_ns);
         self.out_of_time |= !in_time && self.units_spent > 0;
         self.open()
     }
 
-    /// Half of what is left now.
+    /// Half of the remaining budget.
     #[must_use]
     pub fn half(&self) -> Share {
         let half_ns = |end_ns: u64| {
@@ -173,7 +173,7 @@ impl<'a> Meter<'a> {
         }
     }
 
-    /// Keeps one of `parts` parts of what is left now back, until it is released.
+    /// Keeps back one of `parts` parts of the remaining budget, until it is released.
     pub fn reserve(&mut self, parts: u64) -> Reserve {
         let units = self.units_left / parts;
         self.units_left -= units;
@@ -185,14 +185,14 @@ impl<'a> Meter<'a> {
         Reserve { units, ns }
     }
 
-    /// Opens again for what was kept back.
+    /// Gives a reserve back to the budget, which may open the meter again.
     pub fn release(&mut self, reserve: Reserve) {
         self.units_left = self.units_left.saturating_add(reserve.units);
         self.deadline_ns = self.deadline_ns.map(|end_ns| end_ns + reserve.ns);
         self.look();
     }
 
-    /// Whether a share is not used up.
+    /// Whether a share is not used up yet.
     #[must_use]
     pub fn within(&self, share: Share) -> bool {
         let in_time = |end_ns: u64| self.clock.monotonic_ns() < end_ns;
@@ -205,7 +205,7 @@ impl<'a> Meter<'a> {
         self.units_spent
     }
 
-    /// The longest time between two reads of the clock so far in which nothing was done but units of work; what was not
+    /// The longest time so far between two reads of the clock in which only charged units were done; work that was not
     /// charged may take long by itself.
     #[must_use]
     pub fn longest_pause(&self) -> Pause {
@@ -223,15 +223,15 @@ impl<'a> Meter<'a> {
         self.units_left = self.units_left.saturating_sub(units);
     }
 
-    /// Units of work alone took that time.
+    /// Notes a pause in which only charged units were done.
     fn note(&mut self, pause: Pause) {
         if pause.ns > self.longest.ns {
             self.longest = pause;
         }
     }
 
-    /// Reads the clock, and beats when it is time; returns what went by since the read before, nothing where nobody
-    /// asks for the time.
+    /// Reads the clock, and calls the beat if it is due; returns the time since the previous read, or nothing if
+    /// neither a deadline nor a beat needs it.
     fn look(&mut self) -> Pause {
         self.units_to_next_read = CHEAP_UNITS_PER_READ;
         if self.deadline_ns.is_none() && self.beat.is_none() {

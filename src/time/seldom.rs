@@ -1,10 +1,10 @@
-//! What goes wrong again and again: told when it begins, then now and then while it goes on. In: how often it was. Out:
-//! what a line in the log is to tell.
+//! Limits log lines about a repeated failure: one when it begins, then one now and then while it goes on. In: numbers
+//! of failures. Out: the number that a log line is to report.
 
-/// Time between two lines while it goes on, nanoseconds.
+/// Least time between two log lines, nanoseconds.
 const TOLD_NS: u64 = 10_000_000_000;
 
-/// How often it was since the last line.
+/// Number of failures since the last log line.
 #[derive(Debug, Default)]
 pub struct Seldom {
     count: u64,
@@ -12,12 +12,12 @@ pub struct Seldom {
 }
 
 impl Seldom {
-    /// Counts how often it was, to be told of at the next [`Seldom::note`].
+    /// Adds failures, which the next [`Seldom::note`] reports.
     pub fn add(&mut self, count: u64) {
         self.count += count;
     }
 
-    /// Counts how often it was; how often is to be told of now, if at all.
+    /// Adds failures; returns the number to report now, if any.
     ///
     /// * `now_ns` - nanoseconds, always of the same clock.
     pub fn note(&mut self, count: u64, now_ns: u64) -> Option<u64> {
@@ -45,7 +45,7 @@ mod tests {
             .filter_map(|ms| seldom.note(1, 6 + ms * 1_000_000))
             .collect();
         assert_eq!(told, [10_000, 10_000]);
-        // What was after the last line is told, though there is none any more; then there is silence.
+        // Failures after the last line are reported, even if no new ones come; then there is silence.
         assert_eq!(seldom.note(0, 6 + 30_000_000_000), Some(5_000));
         assert_eq!(seldom.note(0, 6 + 90_000_000_000), None);
     }
