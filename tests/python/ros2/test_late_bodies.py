@@ -44,6 +44,10 @@ class Late:
     def send(self, kind, topic, x):
         """The scene's bodies, and this one at x."""
         self.feeder()
+        self.send_one(kind, topic, x)
+
+    def send_one(self, kind, topic, x):
+        """One body at x."""
         if kind == "tf":
             return self.feeder.tf.publish(TFMessage(transforms=[self.feeder.link(topic, "world", (x, 0.0, 0.0))]))
         message = PoseStamped() if kind == "pose" else Odometry()
@@ -112,6 +116,32 @@ def test_a_body_that_left_is_not_heard_any_more_and_may_come_again_elsewhere(roo
         late.send(kind, other, 9.0)
         room.spin(0.01)
         assert late.where("late")[0] == [9, 0, 0]
+
+
+def test_many_bodies_with_topics_of_their_own_in_one_edit_are_all_heard(room):
+    late = Late(room)
+    names = [f"late_{n}" for n in range(60)]
+    ball = {"type": "sphere", "radius": 0.1}
+    edits = [{"put": {"name": name, "source": "poses", "ros_topic": f"/{name}/pose", "shape": ball}} for name in names]
+    assert late.reader.request({"edits": edits})["ok"]
+    # one of them leaves, and one is moved to another topic, perhaps before there was time to subscribe to theirs
+    last = dict(edits[-1]["put"], ros_topic="/elsewhere/pose")
+    assert late.reader.request({"edits": [{"remove": names[-2]}, {"put": last}]})["ok"]
+    topics = {name: f"/{name}/pose" for name in names if name != names[-2]} | {names[-1]: "/elsewhere/pose"}
+    places = {name: 10.0 + n for n, name in enumerate(topics)}
+
+    def send():
+        late.feeder()
+        for name, topic in topics.items():
+            late.send_one("pose", topic, places[name])
+
+    def all_known():
+        result = late.reader.latest() or late.reader.wait()
+        rows = {int(row["body"]): row for row in result.bodies}
+        found = {name: rows.get(late.reader.names.get(name)) for name in topics}
+        return all(row is not None and row["status"] == 0 and row["position"][0] == places[name] for name, row in found.items())
+
+    room.until(all_known, "all of them known", then=send)
 
 
 def test_a_chain_that_never_changes_makes_a_late_body_known_at_once(room):

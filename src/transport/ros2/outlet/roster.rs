@@ -18,13 +18,19 @@ use crate::transport::{BodyChange, BodyNote};
 
 /// Between two tries of bodies whose subscription failed, nanoseconds.
 const RETRY_NS: u64 = 1_000_000_000;
-/// Bodies tried at a time: each that fails again costs a look for files.
+/// Bodies tried again at a time: each that fails again costs a look for files.
 const RETRIES_MAX: usize = 8;
+/// How long this thread may subscribe before it sends again, nanoseconds: one subscription can wait 50 ms for its
+/// reader, and an edit can bring thousands of bodies.
+const TRIES_NS: u64 = 20_000_000;
 
-/// Bodies that need a subscription and have none, and what was said of each: who waits longest in front.
+/// Bodies that need a subscription and have none.
 #[derive(Debug, Default)]
 pub(in super::super) struct Unheard {
-    of: VecDeque<(BodyNote, String)>,
+    /// Not tried yet, in the order in which they came.
+    untried: VecDeque<BodyNote>,
+    /// Tried in vain, with the error that was logged; the one that waits longest in front.
+    failed: VecDeque<(BodyNote, String)>,
     tried_ns: u64,
 }
 
@@ -38,36 +44,42 @@ impl Unheard {
         };
         let bodies = scene.bodies.iter().filter(is_one);
         Self {
-            of: bodies.map(|body| (body.clone(), String::new())).collect(),
-            tried_ns: 0,
+            failed: bodies.map(|body| (body.clone(), String::new())).collect(),
+            ..Self::default()
         }
     }
 
-    /// Those whose turn it is, taken out.
-    fn due(&mut self, now_ns: u64) -> Vec<(BodyNote, String)> {
-        if self.of.is_empty() || now_ns.saturating_sub(self.tried_ns) < RETRY_NS {
-            return Vec::new();
+    /// Failed ones that are due for another try, taken out.
+    fn due(&mut self, now_ns: u64) -> VecDeque<(BodyNote, String)> {
+        if self.failed.is_empty() || now_ns.saturating_sub(self.tried_ns) < RETRY_NS {
+            return VecDeque::new();
         }
         self.tried_ns = now_ns;
-        self.of.drain(..self.of.len().min(RETRIES_MAX)).collect()
+        let count = self.failed.len().min(RETRIES_MAX);
+        self.failed.drain(..count).collect()
     }
 
-    /// A body that waits for its subscription hangs on another one now, or does no more.
+    /// Notes that a body that waits for its subscription is attached to another body now, or no longer.
     fn hang(&mut self, name: &str, attached: bool) {
-        let mut waiting = self.of.iter_mut();
-        if let Some((body, _)) = waiting.find(|(body, _)| body.name == name) {
+        let failed = self.failed.iter_mut().map(|(body, _)| body);
+        let mut waiting = failed.chain(&mut self.untried);
+        if let Some(body) = waiting.find(|body| body.name == name) {
             body.attached = attached;
         }
     }
 
     fn remove(&mut self, name: &str) {
-        self.of.retain(|(body, _)| body.name != name);
+        self.untried.retain(|body| body.name != name);
+        self.failed.retain(|(body, _)| body.name != name);
     }
 }
 
 impl Outlet {
     /// Boxes and subscriptions of bodies that edits put: only this thread has the node.
+    ///
+    /// Cost: at most [`TRIES_NS`] and one subscription more; bodies that are left are subscribed to at the next call.
     pub(super) fn follow_edits(&mut self) {
+        let until_ns = SystemClock.monotonic_ns().saturating_add(TRIES_NS);
         let changes = std::mem::take(&mut *open(&self.shared.changes));
         for change in changes {
             let line = match &change {
@@ -78,7 +90,7 @@ impl Outlet {
                     };
                     // A second subscription takes files that may not be there, and until it is found nothing comes.
                     let stays = self.topics.hears(body);
-                    (!stays).then(|| self.meet(body, "")).flatten()
+                    (!stays).then(|| self.meet(body, until_ns)).flatten()
                 }
                 BodyChange::Removed(name) => {
                     self.part(name);
@@ -91,31 +103,65 @@ impl Outlet {
             };
             open(&self.shared.arrivals).push(Arrival { change, line });
         }
-        self.try_again(SystemClock.boottime_ns());
+        self.try_untried(until_ns);
+        self.try_again(SystemClock.boottime_ns(), until_ns);
     }
 
-    /// Bodies whose subscription failed: what was in its way may be gone.
-    fn try_again(&mut self, now_ns: u64) {
-        for (body, said) in self.unheard.due(now_ns) {
-            let Some(line) = self.meet(&body, &said) else {
-                continue;
-            };
-            let text = format!("body {}: its poses can come now", body.name);
-            self.shared.say(Say::Info, &text);
-            let (change, line) = (BodyChange::Put(body), Some(line));
-            open(&self.shared.arrivals).push(Arrival { change, line });
+    /// Takes a body that came, or is heard elsewhere now; the subscription it needs, if it needs one and time is left.
+    fn meet(&mut self, body: &BodyNote, until_ns: u64) -> Option<Line> {
+        self.part(&body.name);
+        // An earlier body that still waits comes first.
+        if is_over(until_ns) || !self.unheard.untried.is_empty() {
+            self.unheard.untried.push_back(body.clone());
+            return None;
+        }
+        self.subscribe(body, "")
+    }
+
+    /// Bodies that came when no time was left to subscribe.
+    fn try_untried(&mut self, until_ns: u64) {
+        while !is_over(until_ns)
+            && let Some(body) = self.unheard.untried.pop_front()
+        {
+            if let Some(line) = self.subscribe(&body, "") {
+                self.deliver(body, line);
+            }
         }
     }
 
-    /// Takes a body that came, or is heard elsewhere now; the subscription it needs, if it needs one.
+    /// Bodies whose subscription failed: what was in its way may be gone.
+    fn try_again(&mut self, now_ns: u64, until_ns: u64) {
+        let mut due = self.unheard.due(now_ns);
+        while !is_over(until_ns)
+            && let Some((body, said)) = due.pop_front()
+        {
+            if let Some(line) = self.subscribe(&body, &said) {
+                let text = format!("body {}: its poses can come now", body.name);
+                self.shared.say(Say::Info, &text);
+                self.deliver(body, line);
+            }
+        }
+        while let Some(left) = due.pop_back() {
+            self.unheard.failed.push_front(left);
+        }
+    }
+
+    /// Hands the receiving thread the subscription of a body that it knows already.
+    fn deliver(&self, body: BodyNote, line: Line) {
+        let (change, line) = (BodyChange::Put(body), Some(line));
+        open(&self.shared.arrivals).push(Arrival { change, line });
+    }
+
+    /// The subscription that a body needs, if it needs one; a body whose subscription fails is tried again later.
     ///
-    /// * `said` - what was said of it when this failed last.
-    fn meet(&mut self, body: &BodyNote, said: &str) -> Option<Line> {
-        self.part(&body.name);
+    /// * `said` - the error that was logged when this failed last.
+    fn subscribe(&mut self, body: &BodyNote, said: &str) -> Option<Line> {
         let kind = self.sources.get(body.source?)?.ros2.as_ref()?.kind;
         if kind == RosKind::Tf {
             return None;
         }
+        // The topic of an earlier try is given back.
+        self.part(&body.name);
         let topic = self.topics.put(body, &mut self.names).map_err(Error::Usage);
         if let Ok(topic) = &topic {
             self.strangers.meet(topic, kind);
@@ -132,7 +178,7 @@ impl Outlet {
                 if text != said {
                     self.shared.say(Say::Error, &text);
                 }
-                self.unheard.of.push_back((body.clone(), text));
+                self.unheard.failed.push_back((body.clone(), text));
                 None
             }
         }
@@ -146,6 +192,10 @@ impl Outlet {
             self.readers.misfits.part(&topic);
         }
     }
+}
+
+fn is_over(until_ns: u64) -> bool {
+    SystemClock.monotonic_ns() >= until_ns
 }
 
 #[cfg(test)]
@@ -163,13 +213,13 @@ mod tests {
             (body, "no files".to_owned())
         };
         let mut unheard = Unheard {
-            of: names.map(note).collect(),
-            tried_ns: 0,
+            failed: names.map(note).collect(),
+            ..Unheard::default()
         };
         let first = unheard.due(RETRY_NS);
         assert_eq!((first.len(), first[0].0.name.as_str()), (RETRIES_MAX, "b0"));
         assert_eq!(first[0].1, "no files");
-        unheard.of.extend(first);
+        unheard.failed.extend(first);
         assert!(unheard.due(2 * RETRY_NS - 1).is_empty());
         unheard.remove("b8");
         let names = unheard.due(2 * RETRY_NS).into_iter().map(|(b, _)| b.name);
