@@ -172,7 +172,9 @@ impl Replay {
         let tick = record.out.tick.header.tick;
         self.lawful |= is_timed(&record.out.tick);
         for between in &record.between {
-            if let Some(spot) = self.do_between(between) {
+            if let Some(spot) = self.do_between(between)
+                && compared
+            {
                 return Ok(Some(self.difference(tick, spot)));
             }
         }

@@ -20,7 +20,7 @@ mod stage;
 use std::io::{Seek, SeekFrom, Write};
 
 use rich::{Play, play};
-use stage::{Folder, ended, records, replay};
+use stage::{Folder, ended, records, replay, replay_from};
 use sweepd::record::file::{Ending, McapSink, Medium};
 use sweepd::record::{Between, EditRecord, Origin, Sink, Start, TickRecord, TreeMark};
 use sweepd::wire::{PairRow, Verdict, pair_flags};
@@ -251,8 +251,13 @@ fn bug_by_the_law_another_tree_that_wears_first_is_no_difference() {
     );
     let (start, mut all) = records(&folder.file());
     all[10].between.extend(marks);
-    let found = replay(&start, all).0.unwrap();
+    let ticks = all.len() as u64;
+    let found = replay(&start, all.clone()).0.unwrap();
     assert_eq!(&*found.place, "between ticks", "{found}");
+    // A tick that is only run is not compared, nor is what came before it (it ended the replay once).
+    let (found, tally) = replay_from(&start, all, 11);
+    assert_eq!(found.map(|f| f.to_string()), None);
+    assert_eq!(tally.exact, ticks - 11);
 }
 
 /// A disk with so many bytes left.

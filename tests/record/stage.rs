@@ -163,9 +163,18 @@ pub fn ended(path: &Path) -> (Start, Vec<TickRecord>, Ending) {
 
 /// Replays records up to the first difference.
 pub fn replay(start: &Start, all: Vec<TickRecord>) -> (Option<Difference>, Tally) {
+    replay_from(start, all, 0)
+}
+
+/// The same; the first `run_only` records are run and not compared.
+pub fn replay_from(
+    start: &Start,
+    all: Vec<TickRecord>,
+    run_only: usize,
+) -> (Option<Difference>, Tally) {
     let mut replay = Replay::new(start).unwrap();
-    for mut record in all {
-        if let Some(found) = replay.tick(&mut record, true).unwrap() {
+    for (at, mut record) in all.into_iter().enumerate() {
+        if let Some(found) = replay.tick(&mut record, at >= run_only).unwrap() {
             return (Some(found), replay.tally());
         }
     }
