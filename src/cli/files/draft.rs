@@ -64,6 +64,8 @@ impl Draft {
         };
         let (path, is_file) = match &there {
             Some(file) => (path.canonicalize()?, file.metadata()?.is_file()),
+            // Through a link to a file that does not exist the file is made, and the link stays.
+            None if path.is_symlink() => return Self::in_place(path),
             None => (path.to_owned(), true),
         };
         if let Some(Err(TryLockError::WouldBlock)) =
@@ -76,7 +78,7 @@ impl Draft {
         name.push(format!(".{}.part", std::process::id()));
         let beside = path.with_file_name(name);
         let made = if is_file {
-            File::create(&beside)
+            create_beside(&beside)
         } else {
             Err(ErrorKind::Unsupported.into())
         };
@@ -86,6 +88,16 @@ impl Draft {
             (Err(e), None) => return Err(e),
         };
         Ok(Self { path, file, beside })
+    }
+
+    /// Creates the file at its final path.
+    fn in_place(path: &Path) -> IoResult<Self> {
+        let file = File::create(path)?;
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            beside: None,
+        })
     }
 
     fn try_write(&mut self, text: &str) -> IoResult<()> {
@@ -102,6 +114,18 @@ impl Draft {
         std::fs::rename(beside, &self.path)?;
         self.beside = None;
         Ok(())
+    }
+}
+
+/// Creates a new file. An existing one of this name was left by a killed process with the same number; it is removed,
+/// since it could be a link to another file.
+fn create_beside(path: &Path) -> IoResult<File> {
+    match File::create_new(path) {
+        Err(e) if e.kind() == ErrorKind::AlreadyExists => {
+            std::fs::remove_file(path)?;
+            File::create_new(path)
+        }
+        made => made,
     }
 }
 
@@ -148,6 +172,23 @@ mod tests {
             (left(), std::fs::read_to_string(&path).unwrap()),
             (1, "new".into())
         );
+        // A link in the place of the temporary file is not followed.
+        let elsewhere = folder.join("elsewhere");
+        std::fs::write(&elsewhere, "kept").unwrap();
+        let beside = folder.join(format!(".page.html.{}.part", std::process::id()));
+        std::os::unix::fs::symlink(&elsewhere, &beside).unwrap();
+        open(true).unwrap().write("newer").unwrap();
+        assert_eq!(std::fs::read_to_string(&elsewhere).unwrap(), "kept");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "newer");
+        // A link to a file that does not exist yet stays a link.
+        let (link, far) = (folder.join("link"), folder.join("far"));
+        std::os::unix::fs::symlink(&far, &link).unwrap();
+        Draft::open(&link, true, "a test")
+            .unwrap()
+            .write("far")
+            .unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(std::fs::read_to_string(&far).unwrap(), "far");
         // Another process that is writing the file, such as a recorder, is not disturbed.
         let held = File::options().write(true).open(&path).unwrap();
         held.try_lock().unwrap();
