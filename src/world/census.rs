@@ -317,3 +317,43 @@ fn pairs_of(count_a: u64, count_b: u64, same: bool) -> u64 {
         count_a * count_b
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builtin::Random;
+
+    #[test]
+    fn the_margins_of_the_two_bodies_of_each_pair_of_a_rule_add_up_to_its_distance() {
+        const BODIES: usize = 200;
+        let mut random = Random::new(5);
+        let mut sides_of_one = 0;
+        for _ in 0..200 {
+            let mut margins_m = vec![0.0; BODIES];
+            let mut rules = Vec::new();
+            for _ in 0..4 {
+                let mut side = || {
+                    let share = random.unit().powi(3);
+                    let slots = (0..BODIES).filter(|_| random.unit() < share);
+                    slots.map(BodySlot::at).collect::<Vec<_>>()
+                };
+                let sides = (side(), side());
+                rules.push((sides, random.unit() * 10.0));
+            }
+            for ((a, b), within_m) in &rules {
+                widen_sides(&mut margins_m, (a, b), *within_m);
+                sides_of_one +=
+                    usize::from(a.len().min(b.len()) * LOPSIDED <= a.len().max(b.len()));
+            }
+            for ((side_a, side_b), within_m) in &rules {
+                for (a, b) in side_a
+                    .iter()
+                    .flat_map(|a| side_b.iter().map(move |b| (a, b)))
+                {
+                    assert!(margins_m[a.index()] + margins_m[b.index()] >= *within_m);
+                }
+            }
+        }
+        assert!(sides_of_one > 100, "both ways are tried: {sides_of_one}");
+    }
+}

@@ -27,7 +27,7 @@ impl World {
     ///
     /// What other edits make of the bodies has no say in it: what counts is the scene after the request.
     ///
-    /// * `step` - called after each rule that was compiled.
+    /// * `step` - called after each rule that was compiled, and after each search for its bodies.
     pub(super) fn edit_rules(&mut self, edits: &[Edit], step: &mut dyn FnMut()) -> bool {
         let is_rule = |edit: &Edit| matches!(edit, Edit::Rule(_) | Edit::DropRules { .. });
         if !edits.iter().any(is_rule) {
@@ -49,12 +49,14 @@ impl World {
         }
         let list = draft.to_list();
         self.filters.rules.set(list, &mut self.names, step);
-        self.requery_named(&changed);
+        self.requery_named(&changed, step);
         true
     }
 
     /// A new search for the pairs of all bodies that these rules speak of.
-    fn requery_named(&mut self, rules: &[&PairRule]) {
+    ///
+    /// * `step` - called after each side.
+    fn requery_named(&mut self, rules: &[&PairRule], step: &mut dyn FnMut()) {
         let sides = rules.iter().flat_map(|rule| [&*rule.a, &*rule.b]);
         let patterns: BTreeSet<&str> = sides.collect();
         let mut named = vec![false; self.bodies.len()];
@@ -64,6 +66,7 @@ impl World {
                     named[slot.index()] = true;
                 }
             }
+            step();
         }
         for (index, _) in named.iter().enumerate().filter(|(_, named)| **named) {
             self.requery(BodySlot::at(index));
