@@ -227,7 +227,7 @@ impl<'de> Visitor<'de> for ValueVisitor {
         let mut entries: Vec<Entry> = Vec::new();
         while let Some(key) = map.next_key::<String>()? {
             // Linear search: a table with more than KEYS_MAX keys is refused while it is read, so this stays cheap.
-            if entries.len() > KEYS_MAX || entries.iter().any(|entry| entry.key == key) {
+            if entries.len() >= KEYS_MAX || entries.iter().any(|entry| entry.key == key) {
                 let text = format!("the key `{key}` is doubled, or one of too many: remove it");
                 return Err(serde::de::Error::custom(text));
             }
@@ -265,6 +265,16 @@ mod tests {
         assert!(Node::from_toml("a = 1\na = 2\n").is_err());
         let fault = Node::from_json(br#"{"a": 1, "a": 2}"#).unwrap_err();
         assert!(fault.text.contains("`a` is doubled"), "{}", fault.text);
+    }
+
+    #[test]
+    fn a_table_of_a_request_has_at_most_as_many_keys_as_stated() {
+        let of = |count: usize| {
+            let keys: Vec<_> = (0..count).map(|n| format!("\"k{n}\": 1")).collect();
+            Node::from_json(format!("{{{}}}", keys.join(", ")).as_bytes())
+        };
+        assert!(of(KEYS_MAX).is_ok());
+        assert!(of(KEYS_MAX + 1).is_err());
     }
 
     #[test]

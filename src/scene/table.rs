@@ -86,6 +86,7 @@ impl Table {
         let at = node.at;
         let value = real(node, key)?;
         if !(min..=max).contains(&value) {
+            let value = plain(value);
             let text = format!("{key} is {value}: write a number from {min} to {max}");
             return Err(Fault::new(at, text));
         }
@@ -106,7 +107,7 @@ impl Table {
                     format!("{key} is {real:?}: write a whole number, without a point or exponent");
                 return Err(Fault::new(at, text));
             }
-            Value::Real(real) => (None, real.to_string()),
+            Value::Real(real) => (None, plain(real)),
             _ => (None, kind.to_owned()),
         };
         match whole {
@@ -211,6 +212,16 @@ pub(crate) fn real(node: Node, what: &str) -> Result<f64, Fault> {
     } else {
         let text = format!("{what} is {real}: write a finite number");
         Err(Fault::new(node.at, text))
+    }
+}
+
+/// A number for a message: with an exponent where it would have many zeros.
+fn plain(number: f64) -> String {
+    let size = number.abs();
+    if size == 0.0 || (1e-6..1e15).contains(&size) {
+        number.to_string()
+    } else {
+        format!("{number:e}")
     }
 }
 

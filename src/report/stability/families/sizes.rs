@@ -59,10 +59,16 @@ pub(super) fn size_ratio() -> Vec<Case> {
 
 pub(super) fn quaternion() -> Vec<Case> {
     let mut cases = Vec::new();
-    for off in logs(-16, -3, 1).chain([9.9e-3]) {
+    for (step, off) in logs(-16, -3, 1).chain([9.9e-3]).enumerate() {
         for sign in [1.0, -1.0] {
-            for stand in stands(1.0, 1.0) {
-                let mut case = stand.case(off, sign * 1e-3);
+            for (at, stand) in stands(1.0, 1.0).into_iter().enumerate() {
+                // Too long and too short ones get both signs of the gap.
+                let gap_m = if (step + at).is_multiple_of(2) {
+                    1e-3
+                } else {
+                    -1e-3
+                };
+                let mut case = stand.case(off, gap_m);
                 for pos in &mut case.ticks[0] {
                     pos.q = pos.q.map(|x| x * (1.0 + sign * off));
                 }
