@@ -33,7 +33,7 @@ impl Source {
             if fixed && is_in {
                 self.tree.note_fixed(what.1, receipt.from);
             }
-            // Fixed links are not compared: a restarted publisher sends them again.
+            // Publishers of fixed links are not compared: one that restarts sends its links again.
             let rivals = !fixed && is_in && self.tree.hear(what.1, receipt.from, receipt.now_ns);
             let odd = mixed.filter(|_| is_in).or(odd);
             let odd = if rivals {

@@ -1,4 +1,4 @@
-//! The bodies of a source of common topics: those of the scene, and the changes by edits while the node runs.
+//! The bodies of a source of common topics: those of the scene, plus additions and removals by edits at run time.
 
 use super::super::order::Order;
 use super::super::shelf::Seat;
