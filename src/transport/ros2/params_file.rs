@@ -1,23 +1,23 @@
-//! Parameter files: YAML of `NODE: ros__parameters: NAME: VALUE`. In: text. Out: settings in the file's order, each
-//! with the node pattern it is for.
+//! Parameter files: YAML of `NODE: ros__parameters: NAME: VALUE`. In: text. Out: settings in the order of the file,
+//! each with the pattern of the nodes that it applies to.
 
 use yaml_rust2::parser::Parser;
 use yaml_rust2::{Event, Yaml, YamlLoader};
 
 use super::told::brief;
 
-/// A value of a parameter as YAML has it.
+/// A parameter value in YAML.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// true or false.
     Flag(bool),
-    /// A whole number.
+    /// An integer.
     Whole(i64),
-    /// A number.
+    /// A floating-point number.
     Real(f64),
     /// A text.
     Text(String),
-    /// A list of values of one kind.
+    /// A list of values.
     List(Vec<Value>),
 }
 
@@ -33,7 +33,7 @@ impl std::fmt::Display for Value {
     }
 }
 
-/// A parameter that somebody set.
+/// A parameter setting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// Node pattern: `/**`, `/*`, `/ns/node`, `node`.
@@ -42,22 +42,22 @@ pub struct Setting {
     pub name: String,
     /// Its value.
     pub value: Value,
-    /// Where it was said, for messages.
+    /// Where the setting was given, for messages.
     pub said: String,
 }
 
-/// Largest parameter file, bytes: a person wrote it.
+/// Largest parameter file, bytes: such files are written by hand.
 pub(super) const FILE_BYTES_MAX: usize = 1 << 20;
-/// Most tables and lists in one another, for each of which the loader calls itself: the stack has room for thousands.
-/// More than [`DEPTH_MAX`], which tells the place.
+/// Deepest nesting of tables and lists. The YAML loader recurses into each level, and the stack has room for thousands.
+/// Larger than [`DEPTH_MAX`], whose error names the place.
 const NESTED_MAX: usize = 64;
-/// Deepest table in a file; deeper ones are made to overflow something.
+/// Deepest table in a file; only files made to overflow a parser are deeper.
 const DEPTH_MAX: usize = 16;
 
-/// Reads a file's text.
+/// Parses the text of a parameter file.
 ///
 /// # Errors
-/// One text that names the file, what is wrong and what to write.
+/// One text that names the file, the problem and the fix.
 pub fn parse(text: &str, file: &str) -> Result<Vec<Setting>, String> {
     if text.len() > FILE_BYTES_MAX {
         return Err(format!(
@@ -81,10 +81,10 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Setting>, String> {
     Ok(all)
 }
 
-/// A value as on a command line.
+/// Parses a value of the command line.
 ///
 /// # Errors
-/// One text, when it is no value.
+/// One text, when the text is not one value.
 pub fn parse_value(text: &str) -> Result<Value, String> {
     let documents = load(text).map_err(|why| format!("`{}`: {why}", brief(text)))?;
     match documents.as_slice() {
@@ -94,10 +94,10 @@ pub fn parse_value(text: &str) -> Result<Value, String> {
     }
 }
 
-/// The documents of a text.
+/// Loads the YAML documents of a text.
 ///
-/// The loader calls itself for each table and list in another, and copies what an alias names: before it does, the
-/// events of the parser, which does neither, are looked at.
+/// The loader recurses into nested tables and lists, and copies the target of each alias. The event parser does
+/// neither, so the nesting and the aliases are checked on its events first.
 fn load(text: &str) -> Result<Vec<Yaml>, String> {
     let not_yaml = |e| format!("this is not YAML: {e}");
     let (mut events, mut nested) = (Parser::new_from_str(text), 0_usize);
@@ -106,7 +106,7 @@ fn load(text: &str) -> Result<Vec<Yaml>, String> {
             Event::StreamEnd => break,
             Event::SequenceStart(..) | Event::MappingStart(..) => nested += 1,
             Event::SequenceEnd | Event::MappingEnd => nested = nested.saturating_sub(1),
-            // ROS takes none either.
+            // ROS rejects aliases, too.
             Event::Alias(_) => {
                 return Err("it has an alias (*NAME): write out what it stands for".to_owned());
             }
@@ -121,7 +121,7 @@ fn load(text: &str) -> Result<Vec<Yaml>, String> {
     YamlLoader::load_from_str(text).map_err(not_yaml)
 }
 
-/// Walks down namespaces to the tables `ros__parameters`.
+/// Collects the `ros__parameters` tables below a table of namespaces and nodes.
 fn nodes(
     table: &Yaml,
     path: &str,
@@ -163,7 +163,7 @@ fn nodes(
     Ok(())
 }
 
-/// Walks down the dots of names to values.
+/// Collects the settings of a table; the keys of nested tables are joined with dots.
 fn settings(
     table: &Yaml,
     node: &str,
@@ -211,7 +211,7 @@ fn value(yaml: &Yaml) -> Option<Value> {
         Yaml::Boolean(flag) => Some(Value::Flag(*flag)),
         Yaml::Integer(whole) => Some(Value::Whole(*whole)),
         Yaml::Real(_) => yaml.as_f64().map(Value::Real),
-        // Those that rcl takes beside true and false.
+        // The words that rcl accepts as true and false.
         Yaml::String(text) => Some(match text.as_str() {
             "Y" | "y" | "yes" | "Yes" | "YES" | "True" | "TRUE" | "on" | "On" | "ON" => {
                 Value::Flag(true)
@@ -238,11 +238,11 @@ fn wrong(file: &str, place: &str, why: &str) -> String {
 }
 
 impl Setting {
-    /// Whether it is for the node of this full name (`/ns/name`).
+    /// Whether the setting applies to the node of this full name (`/ns/name`).
     #[must_use]
     pub fn is_for(&self, full_name: &str) -> bool {
         let pattern = self.node.trim_start_matches('/');
-        // A name without a slash is a node's name in the root, or given by `-p NODE:NAME` in any namespace.
+        // A name without a slash matches a node in the root namespace; from `-p NODE:NAME` it matches in any namespace.
         let last = full_name.rsplit('/').next().unwrap_or_default();
         let plain = !self.node.contains('/') && !pattern.contains('*');
         if plain && self.said.starts_with("-p ") {
@@ -254,7 +254,7 @@ impl Setting {
     }
 }
 
-/// `*` is one part of a name, `**` any number of them.
+/// Whether a pattern matches a name: `*` matches one part of the name, `**` any number of parts.
 fn matches(pattern: &[&str], name: &[&str]) -> bool {
     match (pattern, name) {
         ([], []) => true,
@@ -342,7 +342,7 @@ mod tests {
         assert!(!is_for("/other", "/sweepd"));
     }
 
-    /// The loader ran out of stack before any depth was looked at, or filled the memory with copies.
+    /// Before the fix, the loader overflowed the stack before any depth check, or filled the memory with copies.
     #[test]
     fn bug_what_is_nested_without_an_end_or_copies_itself_is_refused() {
         let stairs: String = (0..500).map(|at| format!("{:at$}a:\n", "")).collect();

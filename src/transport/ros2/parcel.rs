@@ -1,5 +1,5 @@
-//! What the tick thread hands to the sending thread: copies of rows, cut to the limits of ROS 2, in a queue of two.
-//! In: an outbox. Out: parcels, the newest kept. No allocation once a parcel has been at its largest.
+//! The queue between the tick thread and the sending thread: two ticks, as copies of rows cut to the limits of ROS 2.
+//! In: an outbox. Out: parcels, the newest kept. The tick thread allocates only for new names and growing row counts.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, PoisonError};
@@ -11,20 +11,20 @@ use crate::wire::{
     TickRow, Verdict, pair_flags,
 };
 
-/// Parcels that wait: one being sent and one behind it; more would only be older.
+/// Parcels that wait: one to be sent next and one after it; more would only be older.
 const QUEUE_MAX: usize = 2;
 
-/// Limits of what goes out on ROS 2.
+/// Row limits of messages on ROS 2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Caps {
-    /// Rows of `~/pairs` a tick.
+    /// Rows of `~/pairs` per tick.
     pub(super) pairs: usize,
-    /// Rows of `~/contacts` a tick.
+    /// Rows of `~/contacts` per tick.
     pub(super) contacts: usize,
 }
 
 impl Caps {
-    /// How many of these rows go out: an event is told once, so none is left out where there are any rows.
+    /// Row limit for these pairs. An event is published only once, so all rows with events fit unless the limit is 0.
     fn pairs_of(self, rows: &[PairRow]) -> usize {
         if self.pairs == 0 || rows.len() <= self.pairs {
             return self.pairs;
@@ -34,13 +34,13 @@ impl Caps {
     }
 }
 
-/// One tick on its way out.
+/// The output of one tick for the sending thread.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Parcel {
     pub(super) tick: TickRow,
-    /// The tick is done; one that is sent from within has no names yet.
+    /// Whether the tick has ended; a parcel from within a tick has only the tick row, and no names yet.
     pub(super) done: bool,
-    /// What of the rest was filled.
+    /// Which row lists were filled.
     pub(super) holds: Demand,
     pub(super) pairs_header: MessageHeader,
     pub(super) pairs: Vec<PairRow>,
@@ -50,16 +50,16 @@ pub(super) struct Parcel {
     pub(super) picker: Picker,
 }
 
-/// Picks the rows of best rank and keeps their order.
+/// Selects the rows of lowest rank and keeps their order.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Picker {
     ranks: Vec<(u8, f64, u32)>,
 }
 
 impl Picker {
-    /// Copies the `most` rows of least rank, ties by place; returns how many were left out.
+    /// Copies the `most` rows of lowest rank, ties by position; returns the number of rows left out.
     ///
-    /// Cost: O(rows), whatever is kept.
+    /// Cost: O(rows + kept log kept).
     fn pick<T: Copy>(
         &mut self,
         rows: &[T],
@@ -93,12 +93,12 @@ impl Picker {
     }
 }
 
-/// Whether it tells of a begin or an end.
+/// Whether the row has a begin or end event.
 fn has_event(row: &PairRow) -> bool {
     row.events & !Event::Persist.bit() != 0
 }
 
-/// Rows with events first, then colliding, possible, near; deepest first.
+/// Rank of a pair: rows with events first, then colliding, possible, near; lowest `gap_min_m` first.
 fn pair_rank(row: &PairRow) -> (u8, f64) {
     let has = |flag: u8| row.flags & flag != 0;
     let class = match Verdict::from_code(row.verdict) {
@@ -113,8 +113,8 @@ fn pair_rank(row: &PairRow) -> (u8, f64) {
 }
 
 impl Parcel {
-    /// Rows that do not go out are told in the tick, too: unless it is colliding it is unknown then, as where the tick
-    /// itself had cut them off. All messages of a tick say the same state.
+    /// Adds rows left out to the tick's `truncated`. The state becomes unknown unless it is colliding, as where the
+    /// engine itself truncates a tick. All messages of a tick have the same state.
     fn note_cut(&mut self, left_out: u64) {
         if left_out == 0 {
             return;
@@ -129,7 +129,7 @@ impl Parcel {
         self.contacts_header.state = header.state;
     }
 
-    /// Takes what a tick filled.
+    /// Copies the output of a tick.
     fn fill(&mut self, outbox: &Outbox, demand: Demand, caps: Caps) {
         self.tick = outbox.tick;
         self.done = true;
@@ -174,21 +174,21 @@ pub(super) struct Parcels {
     bell: Condvar,
 }
 
-/// What the sending thread finds.
+/// Result of waiting for a parcel.
 #[derive(Debug)]
 pub(super) enum Next {
-    /// The oldest parcel that waits, and names where they are new, with their scene revision.
+    /// The oldest waiting parcel, and the names if they are new, with their scene revision.
     Parcel(Box<Parcel>, Option<(u64, Vec<NameRow>)>),
-    /// Nothing came in time.
+    /// No parcel came in time.
     Nothing,
-    /// The node closes.
+    /// The node is closing.
     Stop,
 }
 
 impl Parcels {
-    /// Puts a tick into the queue; the oldest gives way, and one that is alone before others.
+    /// Queues a tick. When the queue is full, the oldest parcel without rows is dropped, else the oldest parcel.
     ///
-    /// * returns - ticks that gave way.
+    /// * returns - number of ticks dropped.
     pub(super) fn put(&self, outbox: &Outbox, demand: Demand, caps: Caps) -> u64 {
         let mut parcel = self.take_spare();
         parcel.fill(outbox, demand, caps);
@@ -198,9 +198,9 @@ impl Parcels {
         self.push(parcel, names)
     }
 
-    /// Puts a tick alone.
+    /// Queues a tick row without other rows.
     ///
-    /// * returns - ticks that gave way.
+    /// * returns - number of ticks dropped.
     pub(super) fn put_tick(&self, tick: &TickRow) -> u64 {
         let mut parcel = self.take_spare();
         parcel.tick = *tick;
@@ -218,7 +218,7 @@ impl Parcels {
         line.ready.push_back(parcel);
         let mut gone = 0;
         if line.ready.len() > QUEUE_MAX {
-            // One that is sent from within a tick has nothing but that tick: rows and events are worth more.
+            // A parcel from within a tick has only the tick row; rows and events are worth more.
             let bare = line.ready.iter().position(|parcel| !parcel.done);
             if let Some(parcel) = line.ready.remove(bare.unwrap_or_default()) {
                 line.spare.push(parcel);
@@ -234,7 +234,7 @@ impl Parcels {
         gone
     }
 
-    /// Waits for a parcel.
+    /// Waits for a parcel, at most for `wait`.
     pub(super) fn next(&self, wait: Duration) -> Next {
         let line = open(&self.line);
         let nothing = |line: &mut Line| line.ready.is_empty() && !line.stop;
@@ -249,18 +249,18 @@ impl Parcels {
         }
     }
 
-    /// Gives a parcel's memory back.
+    /// Returns a parcel's memory for reuse.
     pub(super) fn give_back(&self, parcel: Parcel) {
         open(&self.line).spare.push(parcel);
     }
 
-    /// Ticks that gave way to newer ones.
+    /// Number of ticks dropped for newer ones.
     #[cfg(test)]
     pub(super) fn dropped(&self) -> u64 {
         open(&self.line).dropped
     }
 
-    /// Ends the wait of the sending thread for good.
+    /// Ends the wait of the sending thread permanently.
     pub(super) fn stop(&self) {
         open(&self.line).stop = true;
         self.bell.notify_one();

@@ -1,6 +1,6 @@
-//! From messages of common types to poses of bodies. In: links of `/tf`, stamped poses, odometry. Out: [`Update`]s
-//! for the bodies concerned, or the reason why a body's place is not known. Pure: no DDS beyond the names of
-//! publishers, no clock.
+//! Converts messages of common types to poses of bodies. In: links of `/tf`, stamped poses, odometry. Out: [`Update`]s
+//! of the bodies concerned, with the reason if a pose is unknown. Pure: no clock, and nothing of DDS but the GIDs of
+//! publishers.
 
 mod judge;
 mod links;
@@ -23,76 +23,76 @@ use crate::math::{Quat, Vec3, pose_from};
 use crate::wire::ros::{Odometry, PoseStamped};
 use crate::wire::{RejectReason, SOURCE_NAME_LEN, TransformRow, name_bytes};
 
-/// When and how a message came.
+/// Time and sender of a message.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Receipt {
-    /// Nanoseconds of `CLOCK_BOOTTIME`.
+    /// Time of receipt, nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) now_ns: u64,
-    /// Whether the process stood still before it was read.
+    /// Whether the process was suspended or stalled before the message was read.
     pub(super) waited: bool,
-    /// The node's time, which is what senders stamp with, nanoseconds; 0: not known.
+    /// The node's time, which senders use for stamps, nanoseconds; 0: unknown.
     pub(super) ros_now_ns: u64,
-    /// Who sent it.
+    /// GID of the publisher.
     pub(super) from: Gid,
 }
 
-/// In place of a body that has left: no body has this id.
+/// Seat of a removed body; no body has id 0.
 const NOBODY: Seat = Seat {
     body: 0,
     continuous: false,
     attached: false,
 };
 
-/// One body of a source of common topics.
+/// A body of a source of common topics.
 #[derive(Debug)]
 struct Member {
     seat: Seat,
     name: String,
-    /// Number of its frame in the tree (kind `tf`).
+    /// Index of its frame in the tree (kind `tf`).
     frame: usize,
     /// Its topic (other kinds).
     topic: String,
-    /// The stamps of its poses.
+    /// Order of the stamps of its poses.
     order: Order,
-    /// What was last handed on of it, to say only what is new: links of one round have one time of receipt.
+    /// Result of the last lookup; only a different one is reported. Links of one round share one receipt time.
     last: Option<Result<Found, Missing>>,
-    /// When it was last handed on, nanoseconds of `CLOCK_BOOTTIME`.
+    /// Time of the last update, nanoseconds of `CLOCK_BOOTTIME`.
     told_ns: u64,
-    /// It was then said of a moment at which the process had just stood still, and may not have been taken.
+    /// Whether the last update was made just after the process had stalled; the daemon may have refused it.
     told_late: bool,
-    /// From when on its pose grows old, nanoseconds of `CLOCK_BOOTTIME`; `None`: it has none that does.
+    /// Start of its pose's age, nanoseconds of `CLOCK_BOOTTIME`; `None`: no pose, or a pose that does not age.
     since_ns: Option<u64>,
-    /// What is wrong with it now, for people.
+    /// Its current fault, for messages.
     fault: Option<String>,
 }
 
-/// A source of common topics and its bodies.
+/// A source of common topics, with its bodies.
 #[derive(Debug)]
 pub(super) struct Source {
     pub(super) kind: RosKind,
     pub(super) name: [u8; SOURCE_NAME_LEN],
     pub(super) topic: String,
     pub(super) static_topic: String,
-    /// Its place in the scene.
+    /// Its index in the scene.
     pub(super) place: usize,
     timeout_ns: u64,
     max_skew_ns: u64,
-    /// `max_skew_ns` as the scene says it.
+    /// `max_skew_ns` as set in the scene.
     scene_skew_ns: u64,
-    /// The scene's frame, by name and by its number in the tree.
+    /// The scene's frame: its name and its index in the tree.
     root: (String, usize),
     tree: Tree,
     members: Vec<Member>,
-    /// Widest skew of a chain at the last look, nanoseconds; `None`: no chain.
+    /// Largest skew of a chain at the last look, nanoseconds; `None`: no chain with aging links.
     pub(super) skew_ns: Option<u64>,
-    /// Messages or links that were refused.
+    /// Messages and links refused since the counter was last taken.
     pub(super) refused: u64,
-    /// What was wrong a moment ago.
+    /// Recent faults that end by themselves.
     passing: Passing,
 }
 
 impl Source {
-    /// The sources of common topics of a scene, in its order.
+    /// The sources of common topics of a scene, in the scene's order.
     pub(super) fn of(scene: &RosScene) -> Vec<Self> {
         let mut all = Vec::new();
         for (place, spec) in scene.sources.iter().enumerate() {
@@ -120,17 +120,17 @@ impl Source {
         all
     }
 
-    /// The seats of its bodies, in their order.
+    /// The seats of its bodies, in the order of its members.
     pub(super) fn seats(&self) -> Vec<Seat> {
         self.members.iter().map(|member| member.seat).collect()
     }
 
-    /// The topic of each of its bodies.
+    /// The topic of each member.
     pub(super) fn topics(&self) -> impl Iterator<Item = &str> {
         self.members.iter().map(|member| member.topic.as_str())
     }
 
-    /// What is wrong with its bodies now, at most `most` of them. One that hangs on another is not its to move.
+    /// The current faults of its bodies, at most `most`. Attached bodies are skipped: their source does not move them.
     pub(super) fn faults(&self, most: usize, now_ns: u64) -> Vec<String> {
         let members = self.members.iter();
         let members = members.filter(|member| member.seat != NOBODY && !member.seat.attached);
@@ -142,13 +142,13 @@ impl Source {
         faulty.chain(self.passing.now(now_ns)).take(most).collect()
     }
 
-    /// Sets its time-out, and the widest skew of a chain (`None`: as the scene says).
+    /// Sets its time-out and the largest skew of a chain (`None`: as set in the scene).
     pub(super) fn set_limits(&mut self, timeout_ns: u64, max_skew_ns: Option<u64>) {
         self.timeout_ns = timeout_ns;
         self.max_skew_ns = max_skew_ns.unwrap_or(self.scene_skew_ns);
     }
 
-    /// The clock of all senders went back.
+    /// Drops everything that depends on the senders' clock, because it went back.
     pub(super) fn forget(&mut self) {
         self.tree.forget();
         for member in &mut self.members {
@@ -157,7 +157,7 @@ impl Source {
         }
     }
 
-    /// The poses of bodies whose chains have changed since the last look, or are due for a word.
+    /// Appends updates for bodies whose chains have changed since the last look, or whose update must be repeated.
     pub(super) fn look(&mut self, receipt: Receipt, updates: &mut Vec<Update>) {
         if self.kind != RosKind::Tf {
             return;
@@ -172,8 +172,8 @@ impl Source {
             {
                 skew_ns = skew_ns.max(Some(found.skew_ns));
             }
-            // A chain that never changes is said again and again, because its source vouches for it; one that is broken
-            // until it was said in time.
+            // The pose of a chain of fixed links is repeated, so that it does not become stale; the refusal of a broken
+            // chain is repeated until an update was made without a stall before it.
             let due = receipt.now_ns.saturating_sub(member.told_ns) >= self.timeout_ns / 3;
             let lasts = match &found {
                 Ok(found) => found.received_ns.is_none(),
@@ -193,7 +193,7 @@ impl Source {
             member.fault = fault;
             let Some(result) = result else { continue };
             (member.told_ns, member.told_late) = (receipt.now_ns, receipt.waited);
-            // A chain is as old as its oldest link (law 3.8); that there is no pose is news of now.
+            // A chain is as old as its oldest link (law 3.8); a refusal has the age of this look.
             let earliest = found.as_ref().ok().and_then(|found| found.received_ns);
             let since_ns = earliest.filter(|_| result.is_ok()).map(|(_, ns)| ns);
             member.since_ns = since_ns;
@@ -210,7 +210,7 @@ impl Source {
         self.skew_ns = skew_ns;
     }
 
-    /// Takes a stamped pose for one of its bodies.
+    /// Takes a stamped pose of a body.
     ///
     /// * returns - whether the sender's time went back.
     pub(super) fn take_pose(
@@ -237,7 +237,7 @@ impl Source {
         )
     }
 
-    /// Takes odometry for one of its bodies; its twist is in the body's frame.
+    /// Takes the odometry of a body; its twist is in the body's frame.
     ///
     /// * returns - whether the sender's time went back.
     pub(super) fn take_odometry(
@@ -333,12 +333,12 @@ impl Source {
     }
 }
 
-/// Nanoseconds as seconds.
+/// Converts nanoseconds to seconds.
 pub(super) fn seconds(ns: u64) -> f64 {
     std::time::Duration::from_nanos(ns).as_secs_f64()
 }
 
-/// A twist of the body's frame in the scene's frame; zeros beside a pose that is none, which is refused for itself.
+/// Rotates a twist from the body's frame to the scene's frame; zeros if the pose is invalid, which is refused itself.
 fn turned(turn: Option<Quat>, linear: [f64; 3], angular: [f64; 3]) -> [f64; 6] {
     let Some(turn) = turn else {
         return [0.0; 6];

@@ -1,8 +1,8 @@
-//! Who reads what this node writes. In: what DDS says of endpoints that match and that go. Out: counts; and who was
-//! lost and is back, and whose quality of service does not go with this node's, which DDS says to the same listener.
+//! Remote readers of this node's writers. In: DDS status events of matched and lost endpoints. Out: reader counts, and,
+//! from the same listener, participants that were lost and are back, and endpoints of incompatible quality of service.
 //!
-//! DDS says it once, to one listener, in a queue of 2048: this is the only one, and it is asked at each turn of the
-//! sending thread, ten times a second at least.
+//! DDS reports each event once, to one listener, through a queue of 2048. This is the only listener; the sending thread
+//! polls it in each of its rounds, at least ten times per second.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,16 +25,16 @@ pub(super) struct Readers {
     context: Context,
 }
 
-/// Readers of one writer.
+/// Remote readers of one writer.
 #[derive(Default)]
 struct Matched {
     readers: BTreeSet<GUID>,
-    /// When the last one came, nanoseconds of `CLOCK_BOOTTIME`.
+    /// When the newest reader matched, nanoseconds of `CLOCK_BOOTTIME`.
     newest_ns: u64,
 }
 
 impl Readers {
-    /// Of the writers of a participant.
+    /// Creates the listener of a participant.
     pub(super) fn of(context: &Context) -> Self {
         Self {
             listener: context.domain_participant().status_listener(),
@@ -45,7 +45,7 @@ impl Readers {
         }
     }
 
-    /// Takes what DDS has said since the last call.
+    /// Takes the status events since the last call.
     ///
     /// * `now_ns` - nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) fn hear(&mut self, now_ns: u64) {
@@ -86,7 +86,7 @@ impl Readers {
                 | DomainParticipantStatusEvent::WriterLost { guid, .. } => {
                     self.lose(|endpoint| *endpoint == guid);
                 }
-                // Who was killed or fell silent takes all its readers with it, and nothing is said of each.
+                // A participant that was killed or fell silent loses all its readers, without an event for each.
                 DomainParticipantStatusEvent::ParticipantLost { id, reason } => {
                     self.lose(|endpoint| endpoint.prefix == id);
                     let prefix = format!("{id:?}");
@@ -105,19 +105,19 @@ impl Readers {
         }
     }
 
-    /// Forgets a writer that was given up.
+    /// Forgets a writer that was dropped.
     pub(super) fn forget(&mut self, writer: GUID) {
         self.of.remove(&writer);
         self.misfits.lose(|local, _| *local == writer);
     }
 
-    /// Two go together, whatever was said of them before.
+    /// Removes a misfit: the two endpoints match now.
     fn fit(&mut self, two: (GUID, GUID)) {
         self.misfits.lose(|local, remote| (*local, *remote) == two);
     }
 
-    /// Two do not go together. DDS says it again whenever the other one announces itself, and its topic is looked for
-    /// once, among all that DDS knows.
+    /// Notes two endpoints of incompatible quality of service. DDS repeats the event at each announcement of the
+    /// remote endpoint; its topic is searched only once, among all endpoints that DDS knows.
     fn note_misfit(
         &mut self,
         two: (GUID, GUID),
@@ -140,7 +140,7 @@ impl Readers {
                 of.map(|data| data.subscription_topic_data.topic_name().clone())
             }
         };
-        // One that is not known is gone by now.
+        // An endpoint that DDS no longer knows has left.
         if let Some(topic) = topic {
             self.misfits.put(two, (&topic, remote), qualities);
         }
@@ -159,13 +159,13 @@ impl Readers {
         });
     }
 
-    /// How many read this writer, as of the last [`Self::hear`].
+    /// Number of readers of a writer, as of the last [`Self::hear`].
     pub(super) fn count<M: Serialize>(&self, writer: &Publisher<M>) -> usize {
         let matched = self.of.get(&writer.guid());
         matched.map_or(0, |matched| matched.readers.len())
     }
 
-    /// When the last of those came that read this writer, nanoseconds of `CLOCK_BOOTTIME`; 0: there are none.
+    /// When the newest reader of a writer matched, nanoseconds of `CLOCK_BOOTTIME`; 0: it has no readers.
     pub(super) fn newest_ns<M: Serialize>(&self, writer: &Publisher<M>) -> u64 {
         let matched = self.of.get(&writer.guid());
         matched.map_or(0, |matched| matched.newest_ns)

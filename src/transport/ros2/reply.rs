@@ -1,12 +1,12 @@
-//! Answers of services, none larger than what reaches its client. In: an answer. Out: the same, or what of it there is
-//! room for and a word that the rest is missing.
+//! Sends responses of services, none larger than what reaches the client. In: a response. Out: the same, or the part of
+//! it that fits, with a note that the rest is missing.
 //!
-//! Why: DDS sends an answer together with whose question it is for. `RustDDS` 0.15.1 writes that with a byte too many
-//! where it takes an answer apart (the tag of its `Option` in front of the inline `QoS` of a `DATA_FRAG`), so no reader
-//! can read such an answer, and each of those that follow waits for it: one that is too large silences the service for
-//! all who ask it. Messages of topics go without those words, and whole, whatever their size.
+//! Why: DDS sends a response with the id of its request as inline `QoS`. `RustDDS` 0.15.1 writes one byte too many
+//! there when it fragments the response (the tag of its `Option` in front of the inline `QoS` of a `DATA_FRAG`). No
+//! reader can decode such a response, and all later ones wait for it: one oversized response silences the service for
+//! all clients. Messages of topics have no inline `QoS`, and arrive whole at any size.
 //!
-//! Refused: a copy of `RustDDS` of our own with that byte mended, as long as nobody misses what does not fit.
+//! Refused: our own copy of `RustDDS` without that byte, as long as no client needs larger responses.
 
 use ros2_client::parameters::raw::SetParametersResult;
 use ros2_client::rcl_interfaces::{
@@ -22,21 +22,21 @@ use crate::limits::{ROS_REPLY_BYTES_MAX, ROS_REPLY_TEXT_BYTES_MAX};
 use crate::time::{Clock, SystemClock};
 use crate::wire::ros::{Edited, GapTold, Ticked};
 
-/// What stands before the first field of a message, bytes: which encoding it has.
+/// Size of the CDR header before the first field of a message, which names the encoding, bytes.
 const HEAD_BYTES: usize = 4;
 
-/// Most that is said of what an answer lost, bytes: `/rosout` has readers with small buffers.
+/// Longest text about the parts that a response lost, bytes: readers of `/rosout` have small buffers.
 const SAID_BYTES_MAX: usize = 1 << 16;
 
-/// An answer that can be made shorter.
+/// A response that can be shortened.
 pub(super) trait Reply: Message + Clone + 'static {
-    /// Makes it fit; what was left out, in words.
+    /// Makes it fit; returns the part left out, as text.
     fn shorten(&mut self) -> String;
 }
 
-/// Sends an answer, or what there is room for, which is told.
+/// Sends a response. If it is too large, sends the part that fits and reports the rest on `/rosout`.
 ///
-/// * `name` - the service's, for people.
+/// * `name` - name of the service, for messages.
 pub(super) fn send<Q: Message + Clone + 'static, R: Reply>(
     (server, name): (&Server<Q, R>, &str),
     id: RmwRequestId,
@@ -60,7 +60,7 @@ fn fits<R: Message>(reply: &R) -> bool {
     bytes.is_ok_and(|bytes| bytes.len() + HEAD_BYTES <= ROS_REPLY_BYTES_MAX)
 }
 
-/// The most rows of `len` with which it fits; 0 where it does not even without one.
+/// The largest number of rows, up to `len`, with which the response fits; 0 if it does not fit with any.
 fn most(len: usize, fits_with: impl Fn(usize) -> bool) -> usize {
     let (mut fit, mut over) = (0, len + 1);
     while over - fit > 1 {
@@ -74,7 +74,7 @@ fn most(len: usize, fits_with: impl Fn(usize) -> bool) -> usize {
     fit
 }
 
-/// Cuts a list of an answer to what fits, from its end; how many of how many are left, in words.
+/// Cuts a list of a response from its end until the response fits; returns how many of how many are left, as text.
 fn cut<R: Reply, T: Clone>(reply: &mut R, what: &str, list: fn(&mut R) -> &mut Vec<T>) -> String {
     let all = std::mem::take(list(reply));
     let with = |rows: usize| {
@@ -90,7 +90,7 @@ fn cut<R: Reply, T: Clone>(reply: &mut R, what: &str, list: fn(&mut R) -> &mut V
     )
 }
 
-/// Cuts a text to its head; the whole of it, for people, where it was longer.
+/// Cuts a long text to its head; returns the whole text if it was cut.
 fn head(text: &mut String) -> Option<String> {
     if text.len() <= ROS_REPLY_TEXT_BYTES_MAX {
         return None;
@@ -135,7 +135,7 @@ impl Reply for Ticked {
 
 impl Reply for ListParametersResponse {
     fn shorten(&mut self) -> String {
-        // A scene has so few sources that all names fit; what stands before their dots may not.
+        // A scene has few sources, so all names fit; the prefixes of a request may not.
         self.result.prefixes.clear();
         cut(self, "names", |reply| &mut reply.result.names)
     }
@@ -155,7 +155,7 @@ impl Reply for GetParameterTypesResponse {
 
 impl Reply for DescribeParametersResponse {
     fn shorten(&mut self) -> String {
-        // Types and ranges are for programs, and whole; people ask for one.
+        // Programs need the types and ranges, which stay; people ask for one parameter at a time.
         for one in &mut self.values {
             one.additional_constraints.clear();
         }

@@ -1,5 +1,5 @@
-//! Parameters that were said at the start. In: ROS arguments. Out: settings in their order, files read; or what is
-//! wrong.
+//! Parameters that were set at the start. In: ROS arguments. Out: settings in their order, with those of the files; or
+//! an error.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -10,18 +10,18 @@ use super::params_file::{FILE_BYTES_MAX, Setting, parse};
 use crate::error::{Error, Result};
 
 impl RosArgs {
-    /// The same, with what the files say in place of them: a node that is opened anew begins as the first did, and what
-    /// is wrong with a file is told before anything is begun.
+    /// Replaces the parameter files by their settings: a node that is reopened starts with the settings of the first,
+    /// and errors in a file are reported before anything starts.
     ///
     /// # Errors
-    /// `Error::Usage` where a file cannot be read, or is none of parameters.
+    /// `Error::Usage` when a file cannot be read or is not a parameter file.
     pub fn with_files_read(self) -> Result<Self> {
         let params = said(&self)?.into_iter().map(Params::One).collect();
         Ok(Self { params, ..self })
     }
 }
 
-/// The parameters that were said, files read, in their order.
+/// The settings of the arguments and of their files, in order.
 pub(super) fn said(args: &RosArgs) -> Result<Vec<Setting>> {
     let mut all = Vec::new();
     for params in &args.params {
@@ -39,12 +39,12 @@ pub(super) fn said(args: &RosArgs) -> Result<Vec<Setting>> {
     Ok(all)
 }
 
-/// The text of a file, to a byte more than it may have: a device has no end.
+/// Reads at most one byte more than the limit of a file: a device has no end.
 fn read(path: &Path) -> std::io::Result<String> {
     let mut bytes = Vec::new();
     let most = FILE_BYTES_MAX as u64 + 1;
     File::open(path)?.take(most).read_to_end(&mut bytes)?;
-    // Where it was cut, a part of a letter may be its end; it is refused for its length.
+    // The cut may split a character; the file is refused for its size anyway.
     if bytes.len() > FILE_BYTES_MAX {
         return Ok(String::from_utf8_lossy(&bytes).into_owned());
     }
@@ -75,7 +75,7 @@ mod tests {
         );
     }
 
-    /// `/dev/zero` was read until the memory was full.
+    /// Before the fix, `/dev/zero` was read until memory was exhausted.
     #[test]
     fn bug_a_file_of_parameters_without_an_end_is_read_to_the_limit() {
         let refusal = read_all("--params-file /dev/zero").unwrap_err().to_string();

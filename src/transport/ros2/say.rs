@@ -1,20 +1,20 @@
-//! Levels of what is said to people, on `/rosout` and in the log. Pure.
+//! Levels of messages to people, on `/rosout` and in the log. Pure.
 
 /// A level of `/rosout` and of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Say {
-    /// For the record.
+    /// For information.
     Info,
-    /// To be looked at.
+    /// Needs attention.
     Warn,
     /// Something does not work.
     Error,
-    /// Nothing works.
+    /// Nothing works any more.
     Fatal,
 }
 
 impl Say {
-    /// The least level that is said for the word of `--log-level`.
+    /// The lowest level that is published with this value of `--log-level`.
     pub(super) fn least(word: Option<&str>) -> Self {
         match word {
             Some("warn") => Self::Warn,

@@ -1,8 +1,7 @@
-//! The node's services: scene edits as requests of the daemon, answered when the tick has applied them; the gap of two
-//! bodies; a tick at once.
+//! The node's services: scene edits, answered when a tick has applied them; the gap of two bodies; an immediate tick.
 //!
-//! In: requests of anybody in the domain, on the receiving thread. Out: the JSON of a request, as shared memory carries
-//! it, so that both have one reader, made on a thread of its own; responses.
+//! In: requests of any node in the domain, on the receiving thread. Out: the same JSON requests as over shared memory,
+//! so that both have one parser, built on a separate thread; responses.
 
 mod edits;
 mod gap;
@@ -34,10 +33,10 @@ use crate::wire::ros::{
 };
 use crate::wire::{self, Answer, MessageHeader};
 
-/// Requests that wait for their answer; more are refused at once.
+/// Requests that wait for their response; more are refused at once.
 const OPEN_MAX: usize = 64;
-/// Requests and answers of a service that are kept until all have them. Its clients share them: of ten, one that was
-/// lost on its way was overwritten by those of other clients before it could be sent again.
+/// Requests and responses of a service that DDS keeps until all readers have acknowledged them. All clients share them:
+/// with a depth of ten, a lost response was overwritten by those of other clients before it could be sent again.
 const DEPTH: usize = 256;
 
 impl Message for AttachBody {}
@@ -52,7 +51,7 @@ impl Message for SetFilter {}
 impl Message for TickNow {}
 impl Message for Ticked {}
 
-/// What is asked of the daemon.
+/// Kind of a request to the daemon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Verb {
     Gap,
@@ -64,18 +63,18 @@ enum Verb {
     Reset,
 }
 
-/// What stands between the receiving thread and the tick thread.
+/// The mailbox between the receiving thread and the tick thread.
 #[derive(Debug, Default)]
 pub(super) struct Desk {
-    /// Requests that the tick thread has not taken: token, JSON.
+    /// Requests that the tick thread has not taken yet: token, JSON.
     pub(super) asked: Mutex<Vec<(u64, Vec<u8>)>>,
-    /// Whether some of them are new, and the tick thread is to be woken.
+    /// Whether there are new requests, so that the tick thread must be woken.
     is_written: AtomicBool,
-    /// Ticks at once that it has not taken: tokens.
+    /// Immediate ticks that the tick thread has not taken yet: tokens.
     pub(super) ticks: Mutex<Vec<u64>>,
-    /// Answers that the receiving thread has not taken.
+    /// Answers that the receiving thread has not taken yet.
     pub(super) answered: Mutex<Vec<(u64, Answer)>>,
-    /// Ticks that were asked for.
+    /// Headers of requested ticks, by token, that the receiving thread has not taken yet.
     pub(super) ticked: Mutex<Vec<(u64, MessageHeader)>>,
 }
 
@@ -91,7 +90,7 @@ pub(super) struct Services {
     tick: Server<TickNow, Ticked>,
     pending: BTreeMap<u64, (Verb, RmwRequestId)>,
     ticks: BTreeMap<u64, RmwRequestId>,
-    /// Answers to edits whose names are not known here yet.
+    /// Answers to edits whose names this node does not know yet.
     late: Vec<(u64, Answer)>,
     next: u64,
     allowed: bool,
@@ -99,10 +98,10 @@ pub(super) struct Services {
 }
 
 impl Services {
-    /// Creates them.
+    /// Creates the servers.
     ///
-    /// * `mapping` - how requests and answers are told apart: each DDS of ROS 2 has its own way.
-    /// * `allowed` - whether edits are done.
+    /// * `mapping` - how responses are matched to requests, which differs between the DDS implementations of ROS 2.
+    /// * `allowed` - whether edits are allowed.
     ///
     /// # Errors
     /// `Error::Usage` when remaps collide; `Error::Io` when DDS refuses.
@@ -130,7 +129,7 @@ impl Services {
         })
     }
 
-    /// Starts the thread that puts requests in words.
+    /// Starts the thread that converts requests to JSON.
     ///
     /// * `waker` - of the receiving thread.
     ///
@@ -141,7 +140,7 @@ impl Services {
         Ok(())
     }
 
-    /// Registers them behind the subscriptions.
+    /// Registers the servers with one token, after the subscriptions.
     pub(super) fn register(&mut self, registry: &Registry, token: Token) -> std::io::Result<()> {
         register(&mut self.put, registry, token)?;
         register(&mut self.remove, registry, token)?;
@@ -153,7 +152,7 @@ impl Services {
         register(&mut self.tick, registry, token)
     }
 
-    /// Takes requests and sends responses; whether the tick thread has something to do.
+    /// Takes requests and sends responses; returns whether the tick thread has work.
     pub(super) fn round(&mut self, desk: &Desk, shared: &Shared) -> bool {
         self.respond(desk, shared);
         let mut asked: Vec<(Verb, RmwRequestId, Words)> = Vec::new();
@@ -213,7 +212,7 @@ impl Services {
         self.next
     }
 
-    /// Has a request put in words, or refuses it before any work is done for it.
+    /// Passes a request to the conversion thread, or refuses it before any work is done for it.
     fn ask(&mut self, verb: Verb, id: RmwRequestId, words: Words, shared: &Shared) {
         let token = self.token();
         let refusal = if verb != Verb::Gap && !self.allowed {
@@ -234,14 +233,14 @@ impl Services {
     }
 
     fn respond(&mut self, desk: &Desk, shared: &Shared) {
-        // Taken in statements of their own: a loop would keep the lock while DDS sends, and the tick thread would wait
-        // for it.
+        // Both lists are moved out first: the loops would hold the locks while DDS sends, and the tick thread would
+        // wait for them.
         let mut answered = std::mem::take(&mut self.late);
         answered.append(&mut open(&desk.answered));
         let ticked = std::mem::take(&mut *open(&desk.ticked));
         let names_rev = shared.names_rev();
         for (token, answer) in answered {
-            // Whoever has the answer may send poses by the names that it brought.
+            // A client that has the answer may send poses under the names that its edit added.
             if answer.scene_rev > names_rev {
                 self.late.push((token, answer));
                 continue;
@@ -289,7 +288,7 @@ impl Services {
     }
 }
 
-/// Why a request is refused that would be one too many.
+/// Why a request beyond the limit is refused.
 fn crowded() -> String {
     format!("{OPEN_MAX} requests wait for their answers: ask again later")
 }
@@ -324,10 +323,10 @@ pub(super) fn server<Q: Message + Clone + 'static, R: Message + 'static>(
     patiently(In::AT_START, make).map_err(|e| failed(&full, e))
 }
 
-/// A full name as ros2-client takes it: behind the node's namespace, which alone may have two `_` in a row there.
+/// Converts a full name for ros2-client: relative to the node's namespace, which alone may contain `__` there.
 ///
 /// # Errors
-/// `Error::Usage` for a name that has them elsewhere.
+/// `Error::Usage` for a name with `__` after the namespace.
 fn service_name(full: &str, namespace: &str) -> Result<Name> {
     let root = namespace.trim_end_matches('/');
     let behind = full
@@ -341,10 +340,10 @@ fn service_name(full: &str, namespace: &str) -> Result<Name> {
     })
 }
 
-/// Has the thread that waits on the registry woken by requests.
+/// Registers a server, so that its requests wake the thread that polls the registry.
 ///
 /// # Errors
-/// Those of the system.
+/// The error of the operating system.
 pub(super) fn register<Q: Message + 'static, R: Message + 'static>(
     server: &mut Server<Q, R>,
     registry: &Registry,
@@ -353,7 +352,7 @@ pub(super) fn register<Q: Message + 'static, R: Message + 'static>(
     server.register(registry, token, Interest::READABLE)
 }
 
-/// Takes the requests that wait.
+/// Takes the waiting requests, at most `OPEN_MAX`.
 pub(super) fn receive<Q: Message + 'static, R: Message + 'static>(
     server: &Server<Q, R>,
     shared: &Shared,

@@ -1,5 +1,5 @@
-//! What the node's threads share: counters, who listens, names, faults, and the way to `/rosout`. All of it is read
-//! and written in passing; no thread waits for another here.
+//! State shared by the node's threads: counters, demand, names, faults, and the writer of `/rosout`. All values are
+//! atomics or behind locks that are held briefly; no thread waits for another one here.
 
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
@@ -20,15 +20,15 @@ use crate::transport::{BodyChange, Setting};
 use crate::wire::Demand;
 use crate::wire::ros::{Book, Counts, Time};
 
-/// Stands for no value.
+/// Stands for `None` in an atomic.
 const NONE: u64 = u64::MAX;
-/// A time of `/clock` that is late by less is no sign of another clock, nanoseconds.
+/// A `/clock` message that is late by less is no sign of a restarted clock, nanoseconds.
 const CLOCK_LATE_NS: u64 = 500_000_000;
 
-/// Shared by the threads of the node.
+/// State shared by the threads of the node.
 pub(super) struct Shared {
     pub(super) stop: AtomicBool,
-    /// Whether the node is to be opened anew, because one that DDS took as gone is back.
+    /// Whether the node must be reopened, because a participant that DDS took as lost is back.
     pub(super) again: AtomicBool,
     undecodable: AtomicU64,
     refused: AtomicU64,
@@ -38,32 +38,32 @@ pub(super) struct Shared {
     max_pairs: AtomicUsize,
     max_contacts: AtomicUsize,
     max_skew_ns: AtomicU64,
-    /// Of each source of the scene, nanoseconds.
+    /// Time-out of each source of the scene, nanoseconds.
     timeouts_ns: Vec<AtomicU64>,
     markers: AtomicBool,
     markers_period_ns: AtomicU64,
     collisions: AtomicBool,
     reliable: AtomicBool,
     sim_time: AtomicBool,
-    /// The newest of `/clock`, nanoseconds; 0: none yet.
+    /// Newest time of `/clock`, nanoseconds; 0: none yet.
     pub(super) sim_now_ns: AtomicU64,
-    /// For the tick thread.
+    /// Settings for the tick thread.
     settings: Mutex<Vec<Setting>>,
     pub(super) desk: Desk,
-    /// What edits did to bodies, for the sending thread, which has the node.
+    /// Changes of bodies by edits, for the sending thread, which owns the node.
     pub(super) changes: Mutex<Vec<BodyChange>>,
-    /// The same, with the new subscriptions, for the receiving thread.
+    /// The same changes, with the new subscriptions, for the receiving thread.
     pub(super) arrivals: Mutex<Vec<Arrival>>,
     book: Mutex<Arc<Book>>,
     names_rev: AtomicU64,
     faults: Mutex<Vec<String>>,
     told: Mutex<Told>,
-    /// What the daemon has said, for `/rosout`; the sending thread takes it there.
+    /// Messages of the daemon for `/rosout`; the sending thread publishes them.
     pub(super) words: Mutex<Vec<String>>,
     rosout: Mutex<Option<Arc<Option<Publisher<Log>>>>>,
-    /// The name of the logger.
+    /// Name of the logger.
     node: String,
-    /// Least level that goes to `/rosout`.
+    /// Lowest level that is published on `/rosout`.
     least: Say,
 }
 
@@ -77,9 +77,9 @@ impl std::fmt::Debug for Shared {
 }
 
 impl Shared {
-    /// For the node whose logger has this name.
+    /// Creates the state of the node with this logger name.
     ///
-    /// * `timeouts_ns` - of each source of the scene.
+    /// * `timeouts_ns` - time-out of each source of the scene, nanoseconds.
     pub(super) fn new(node: &str, book: Book, timeouts_ns: &[u64], least: Say) -> Self {
         Self {
             stop: AtomicBool::new(false),
@@ -114,9 +114,9 @@ impl Shared {
         }
     }
 
-    /// Does what parameters say; no tick takes a part of it.
+    /// Applies the effects of parameters; the tick thread gets all its settings together.
     pub(super) fn take(&self, effects: impl Iterator<Item = Effect>) {
-        // Made before the lock is taken, which the tick thread takes, too.
+        // The effects are collected before the lock is taken, because the tick thread takes it, too.
         let effects: Vec<Effect> = effects.collect();
         let mut settings = open(&self.settings);
         effects
@@ -149,12 +149,12 @@ impl Shared {
         }
     }
 
-    /// A setting of the node itself for the tick thread.
+    /// Adds a setting of the node itself for the tick thread.
     pub(super) fn set(&self, setting: Setting) {
         open(&self.settings).push(setting);
     }
 
-    /// What was set since the last call.
+    /// Takes the settings since the last call.
     pub(super) fn take_settings(&self) -> Vec<Setting> {
         std::mem::take(&mut *open(&self.settings))
     }
@@ -165,13 +165,13 @@ impl Shared {
         slot.map_or(u64::MAX, |slot| slot.load(Ordering::Relaxed))
     }
 
-    /// The widest skew of a chain; `None`: as the scene says.
+    /// The largest skew of a chain, nanoseconds; `None`: as set in the scene.
     pub(super) fn max_skew_ns(&self) -> Option<u64> {
         let ns = self.max_skew_ns.load(Ordering::Relaxed);
         (ns != NONE).then_some(ns)
     }
 
-    /// Between two messages of markers, nanoseconds; `None`: none are published.
+    /// Period of marker messages, nanoseconds; `None`: markers are off.
     pub(super) fn markers_period_ns(&self) -> Option<u64> {
         let on = self.markers.load(Ordering::Relaxed);
         on.then(|| self.markers_period_ns.load(Ordering::Relaxed))
@@ -182,19 +182,19 @@ impl Shared {
         self.collisions.load(Ordering::Relaxed)
     }
 
-    /// Whether lost messages of large topics are sent again.
+    /// Whether lost messages of `~/pairs`, `~/contacts` and `~/collisions` are sent again.
     pub(super) fn reliable(&self) -> bool {
         self.reliable.load(Ordering::Relaxed)
     }
 
-    /// Whether time is that of `/clock`.
+    /// Whether the node uses the time of `/clock`.
     pub(super) fn sim_time(&self) -> bool {
         self.sim_time.load(Ordering::Relaxed)
     }
 
-    /// The clock says a time; whether it began anew, where time is that of `/clock`.
+    /// Takes a time of `/clock`; returns whether the clock restarted while the node uses its time.
     ///
-    /// * `order` - of what it has said.
+    /// * `order` - order of the times of this clock.
     /// * `boot_ns` - now, nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) fn tick_clock(&self, clock: Time, order: &mut Order, boot_ns: u64) -> bool {
         let now_ns = clock.to_ns();
@@ -212,7 +212,7 @@ impl Shared {
         back
     }
 
-    /// The node's time, for stamps of what is not about poses.
+    /// The node's time, for stamps of messages without poses.
     pub(super) fn now(&self) -> Time {
         Time::from_ns(if self.sim_time() {
             self.sim_now_ns.load(Ordering::Relaxed)
@@ -221,33 +221,33 @@ impl Shared {
         })
     }
 
-    /// Whether the node closes.
+    /// Whether the node is closing.
     pub(super) fn stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// A sample that could not be decoded.
+    /// Counts a sample that could not be decoded.
     pub(super) fn note_undecodable(&self) {
         self.undecodable.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Samples that were decoded and refused, or passed over for newer ones.
+    /// Counts samples that were decoded, and refused or skipped for newer ones.
     pub(super) fn note_refused(&self, count: u64) {
         self.refused.fetch_add(count, Ordering::Relaxed);
     }
 
-    /// Messages that were not sent.
+    /// Counts messages that were not sent.
     pub(super) fn note_unsent(&self, count: u64) {
         self.unsent.fetch_add(count, Ordering::Relaxed);
     }
 
-    /// Widest skew of a chain now.
+    /// Sets the current largest skew of a chain, nanoseconds; `None`: no chain with a skew.
     pub(super) fn set_skew(&self, skew_ns: Option<u64>) {
         self.skew_ns
             .store(skew_ns.unwrap_or(NONE), Ordering::Relaxed);
     }
 
-    /// The counters as of now.
+    /// The current counters.
     pub(super) fn counts(&self) -> Counts {
         let skew_ns = self.skew_ns.load(Ordering::Relaxed);
         Counts {
@@ -260,7 +260,7 @@ impl Shared {
         }
     }
 
-    /// Who listens, as of the last look of the sending thread.
+    /// The topics that have readers, as of the last look of the sending thread.
     pub(super) fn demand(&self) -> Demand {
         let bits = self.demand.load(Ordering::Relaxed);
         Demand {
@@ -271,14 +271,14 @@ impl Shared {
         }
     }
 
-    /// Says who listens.
+    /// Sets the topics that have readers.
     pub(super) fn set_demand(&self, demand: Demand) {
         let bits =
             u8::from(demand.pairs) | u8::from(demand.contacts) << 1 | u8::from(demand.bodies) << 2;
         self.demand.store(bits, Ordering::Relaxed);
     }
 
-    /// Limits of what goes out.
+    /// The row limits of messages.
     pub(super) fn caps(&self) -> Caps {
         Caps {
             pairs: self.max_pairs.load(Ordering::Relaxed),
@@ -286,33 +286,33 @@ impl Shared {
         }
     }
 
-    /// The names in force.
+    /// The current names.
     pub(super) fn book(&self) -> Arc<Book> {
         Arc::clone(&open(&self.book))
     }
 
-    /// New names.
+    /// Replaces the names.
     pub(super) fn set_book(&self, book: Arc<Book>) {
         *open(&self.book) = book;
     }
 
-    /// The scene revision that the book holds the names of, at least; 0: no tick has said one yet.
+    /// A scene revision whose names the book has, or newer ones; 0: no tick has ended yet.
     pub(super) fn names_rev(&self) -> u64 {
         self.names_rev.load(Ordering::Acquire)
     }
 
-    /// The book holds the names of this scene revision; whether it is a newer one.
+    /// Notes that the book has the names of this scene revision; returns whether the revision is newer than before.
     #[must_use]
     pub(super) fn set_names_rev(&self, scene_rev: u64) -> bool {
         self.names_rev.fetch_max(scene_rev, Ordering::Release) < scene_rev
     }
 
-    /// What is wrong with what comes in, in words.
+    /// The current faults of inputs, as text.
     pub(super) fn faults(&self) -> Vec<String> {
         open(&self.faults).clone()
     }
 
-    /// Takes what is wrong now and says what is new of it.
+    /// Replaces the current faults, and reports those that are new.
     ///
     /// * `now_ns` - nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) fn set_faults(&self, faults: Vec<String>, now_ns: u64) {
@@ -327,12 +327,12 @@ impl Shared {
         }
     }
 
-    /// Opens or closes the way to `/rosout`.
+    /// Sets or removes the writer of `/rosout`.
     pub(super) fn set_rosout(&self, writer: Option<Arc<Option<Publisher<Log>>>>) {
         *open(&self.rosout) = writer;
     }
 
-    /// Says that a source's time went back.
+    /// Reports that the stamps of a source went back.
     ///
     /// * `now_ns` - nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) fn say_back(&self, source: &str, now_ns: u64) {
@@ -340,7 +340,7 @@ impl Shared {
         self.say_seldom(Say::Warn, &text, now_ns);
     }
 
-    /// Says what may happen with each message, once a second.
+    /// Reports an event that may recur with every message; the same text at most once per second.
     pub(super) fn say_seldom(&self, level: Say, text: &str, now_ns: u64) {
         let due = open(&self.told).is_due(text, now_ns);
         if due {
@@ -348,7 +348,7 @@ impl Shared {
         }
     }
 
-    /// Says it on stderr and on `/rosout`.
+    /// Writes a text to the log (stderr) and to `/rosout`.
     pub(super) fn say(&self, level: Say, text: &str) {
         match level {
             Say::Info => tracing::info!("{text}"),
@@ -358,7 +358,7 @@ impl Shared {
         self.write(level, text);
     }
 
-    /// Says it on `/rosout`.
+    /// Publishes a text on `/rosout`, if its level is high enough.
     pub(super) fn write(&self, level: Say, text: &str) {
         if level < self.least {
             return;

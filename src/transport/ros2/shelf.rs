@@ -1,5 +1,5 @@
-//! Where frames from ROS 2 wait for the tick thread. In: whole frames of `~/transforms`, poses of common topics, from
-//! the receiving thread. Out: frames in an inbox. Bounded: the newest are kept, what is passed over is counted.
+//! The queue of frames from ROS 2 for the tick thread. In: whole frames of `~/transforms` and poses of common topics,
+//! from the receiving thread. Out: frames in an inbox. Bounded: the newest are kept, dropped ones are counted.
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
@@ -14,32 +14,32 @@ use crate::wire::{
     frame_flags,
 };
 
-/// A pose of one body that came on a common topic, or why it is none.
+/// The newest pose of a body from a common topic, or why it has none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Update {
-    /// Place of the body among those of its source.
+    /// Index of the body among those of its source.
     pub(super) member: usize,
-    /// Where it is.
+    /// Its pose in the scene's frame, or the refusal.
     pub(super) result: std::result::Result<TransformRow, RejectReason>,
-    /// Its velocity, scene frame; of every pose of a source or of none.
+    /// Its velocity, scene frame; either all poses of a source have one, or none.
     pub(super) velocity: Option<[f64; 6]>,
     /// Sender's stamp, nanoseconds.
     pub(super) stamp_ns: u64,
     /// Receipt, nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) received_ns: u64,
-    /// From when its age counts: receipt of the oldest that it is made of, nanoseconds of `CLOCK_BOOTTIME`.
+    /// Start of its age: receipt of its oldest part, nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) since_ns: u64,
-    /// Whether it waited while the process stood still.
+    /// Whether it waited while the process was stalled.
     pub(super) waited: bool,
 }
 
-/// A body's place in a group; nobody's: id 0.
+/// The body at an index of a group; id 0: none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Seat {
     pub(super) body: u64,
-    /// Whether each of its poses is a part of its way, so that one that gave way to a newer one is missing.
+    /// Whether the body is continuous: each pose is part of its path, so one dropped for a newer one is missing.
     pub(super) continuous: bool,
-    /// Whether it hangs on another body: its poses say nothing, only that its source lives.
+    /// Whether it is attached to another body: its poses only show that its source is alive.
     pub(super) attached: bool,
 }
 
@@ -53,33 +53,33 @@ impl Seat {
     }
 }
 
-/// The newest poses of one source of common topics; they go out as one partial frame.
+/// The newest poses of one source of common topics; they are sent as one partial frame.
 #[derive(Debug)]
 struct Group {
     name: [u8; SOURCE_NAME_LEN],
     session: u64,
-    /// That which spoke for the source in the newest tick; 0: none.
+    /// Session in force for the source in the newest tick; 0: none.
     in_force: u64,
     epoch: u64,
     seq: u64,
-    /// Poses of continuous bodies that gave way since the last frame: its number tells how many are missing.
+    /// Poses of continuous bodies replaced by newer ones since the last frame; `seq` skips as many numbers.
     missing: u64,
     seats: Vec<Seat>,
     /// The newest update of each body since the last frame.
     newest: Vec<Option<Update>>,
-    /// Members that have one.
+    /// Members with an update.
     touched: Vec<usize>,
 }
 
 #[derive(Debug, Default)]
 struct Waiting {
-    /// With the place of their source in the scene, `None` for all that are of none.
+    /// Whole frames, with the index of their source in the scene; `None` for all sources that the scene lacks.
     frames: VecDeque<(Option<usize>, Frame)>,
     spare: Vec<Frame>,
     groups: Vec<Group>,
 }
 
-/// Frames and poses that wait.
+/// Frames and poses that wait for the tick thread.
 #[derive(Debug, Default)]
 pub(super) struct Shelf {
     waiting: Mutex<Waiting>,
@@ -87,7 +87,7 @@ pub(super) struct Shelf {
 }
 
 impl Shelf {
-    /// Adds a source of common topics; groups are numbered in the order they are added.
+    /// Adds a source of common topics; groups are numbered in the order of addition.
     pub(super) fn add_group(&self, name: [u8; SOURCE_NAME_LEN], session: u64, seats: Vec<Seat>) {
         open(&self.waiting).groups.push(Group {
             name,
@@ -102,7 +102,7 @@ impl Shelf {
         });
     }
 
-    /// Gives a place of a group to a body, or to nobody; what waits there is dropped.
+    /// Sets the body at an index of a group, or none; drops its waiting update.
     pub(super) fn set_member(&self, group: usize, member: usize, seat: Seat) {
         let mut waiting = open(&self.waiting);
         let Some(group) = waiting.groups.get_mut(group) else {
@@ -121,7 +121,7 @@ impl Shelf {
         }
     }
 
-    /// The body at a place of a group is another now, by its id or by what it is; what waits there stays.
+    /// Replaces the body at an index of a group by one of another id or shape; keeps its waiting update.
     pub(super) fn renew_member(&self, group: usize, member: usize, seat: Seat) {
         let mut waiting = open(&self.waiting);
         let group = waiting.groups.get_mut(group);
@@ -130,15 +130,15 @@ impl Shelf {
         }
     }
 
-    /// An emptied frame whose memory has been used before.
+    /// An empty frame, with memory from earlier use.
     pub(super) fn spare(&self) -> Frame {
         open(&self.waiting).spare.pop().unwrap_or_default()
     }
 
-    /// Puts a whole frame behind the others; the oldest of its source goes when there are too many.
+    /// Queues a whole frame; when too many of its source wait, the oldest of that source is dropped.
     ///
-    /// * `source` - place of its source in the scene; those of sources that it lacks, whose names anybody may make up,
-    ///   count as one.
+    /// * `source` - index of its source in the scene. All sources that the scene lacks count as one, because anybody
+    ///   can make up their names.
     pub(super) fn put(&self, source: Option<usize>, mut frame: Frame) {
         let mut waiting = open(&self.waiting);
         let of_source = |(other, _): &(Option<usize>, Frame)| *other == source;
@@ -160,7 +160,7 @@ impl Shelf {
         waiting.frames.push_back((source, frame));
     }
 
-    /// Puts poses of a group's bodies; the newer one of a body stands for the older.
+    /// Merges poses of a group's bodies; a newer pose of a body replaces the older one.
     pub(super) fn merge(&self, group: usize, updates: &[Update]) {
         let mut waiting = open(&self.waiting);
         let Some(group) = waiting.groups.get_mut(group) else {
@@ -174,7 +174,7 @@ impl Shelf {
                 group.touched.push(update.member);
                 continue;
             };
-            // The very same, said again, is no part of a way.
+            // An identical update that was repeated is not part of a path.
             let is_other = (old.result, old.stamp_ns) != (update.result, update.stamp_ns);
             let seat = group.seats.get(update.member);
             let goes_on = seat.is_some_and(|seat| seat.continuous && !seat.attached);
@@ -182,7 +182,7 @@ impl Shelf {
         }
     }
 
-    /// The senders' time went back: what is known of the group's bodies is void.
+    /// Discards the state of a group, because the senders' time went back.
     pub(super) fn reset(&self, group: usize) {
         if let Some(group) = open(&self.waiting).groups.get_mut(group) {
             group.epoch += 1;
@@ -195,19 +195,20 @@ impl Shelf {
         }
     }
 
-    /// Learns from a tick who speaks for the sources of groups. A session that somebody else has ended by speaking for
-    /// its source is refused for as long as the daemon runs: where another one has come into force, or none is any
-    /// more, the group goes on under a new one, which is taken as soon as the stranger is silent for the time-out.
+    /// Learns from a tick which sessions are in force for the sources of groups. A group's session that ended because
+    /// a stranger sent frames under its source's name is refused for as long as the daemon runs. So if another session
+    /// has come into force, or the group's own no longer is, the group draws a new one. It comes into force as soon as
+    /// the stranger is silent for the time-out.
     ///
-    /// * `tick` - one that has ended.
-    /// * `draw` - a random session; where it fails it is drawn after the next tick.
+    /// * `tick` - a tick that has ended.
+    /// * `draw` - draws a random session; if it fails, it is called again after the next tick.
     pub(super) fn hear(&self, tick: &TickRow, draw: impl Fn() -> Result<u64>) {
         for group in &mut open(&self.waiting).groups {
             let mut sources = tick.sources.iter().take(usize::from(tick.sources_len));
             let Some(row) = sources.find(|row| row.name == group.name) else {
                 continue;
             };
-            // That a stranger is gone ends his session alone, and frames of ours may wait for their tick.
+            // The end of a stranger's session ends no other, and frames of ours may wait for their tick.
             let may_be_over = row.session != 0 || group.in_force == group.session;
             if may_be_over && row.session != group.in_force && row.session != group.session {
                 let Ok(session) = draw() else { continue };
@@ -217,7 +218,7 @@ impl Shelf {
         }
     }
 
-    /// The sessions of the groups are over.
+    /// Ends the sessions of the groups.
     pub(super) fn end(&self, inbox: &mut Inbox) {
         let mut sessions: Vec<u64> = (open(&self.waiting).groups.iter())
             .map(|group| group.session)
@@ -227,12 +228,12 @@ impl Shelf {
         (sessions.into_iter()).for_each(|session| inbox.end_session(session));
     }
 
-    /// Frames that were passed over for newer ones since the last call.
+    /// Takes the number of frames dropped for newer ones since the last call.
     pub(super) fn take_passed_over(&self) -> u64 {
         self.passed_over.swap(0, Ordering::Relaxed)
     }
 
-    /// Hands everything to the tick thread.
+    /// Moves everything to the tick thread's inbox.
     pub(super) fn drain(&self, inbox: &mut Inbox) {
         let mut waiting = open(&self.waiting);
         let Waiting {
@@ -251,9 +252,9 @@ impl Shelf {
 }
 
 impl Group {
-    /// What is new as a partial frame, in which each pose has its own age: bodies that moved together stay together,
-    /// and none is older for the chain of another. What waited while the process stood still has a frame of its own
-    /// before it, for that is refused as a whole.
+    /// Sends new updates as one partial frame with an age per pose: bodies that moved together stay together, and the
+    /// chain of one body does not make another older. Updates that waited while the process was stalled get a frame of
+    /// their own before it, because such a frame is refused as a whole.
     fn drain(&mut self, inbox: &mut Inbox) {
         let mut touched = std::mem::take(&mut self.touched);
         for waited in [true, false] {
@@ -263,12 +264,12 @@ impl Group {
                 self.fill(&mut touched, waited, inbox.push());
             }
         }
-        // A place whose body has left has nothing new.
+        // A member whose body was removed has no update.
         touched.clear();
         self.touched = touched;
     }
 
-    /// One frame of those that `waited` or did not.
+    /// Fills a frame with the updates whose `waited` is as given.
     fn fill(&mut self, touched: &mut Vec<usize>, waited: bool, frame: &mut Frame) {
         self.seq += 1 + std::mem::take(&mut self.missing);
         let (mut received_ns, mut since_ns, mut stamp_ns) = (u64::MAX, 0, 0);
@@ -283,7 +284,7 @@ impl Group {
             since_ns = since_ns.max(update.since_ns);
             stamp_ns = stamp_ns.max(update.stamp_ns);
             match update.result {
-                // The daemon would refuse it, in each tick, and nobody could end that.
+                // The daemon refuses poses of attached bodies, in each tick, and no user could end that.
                 _ if attached => {}
                 Ok(row) => {
                     frame.transforms.push(TransformRow { body, ..row });
@@ -301,7 +302,7 @@ impl Group {
             session: self.session,
             epoch: self.epoch,
             seq: self.seq,
-            // Frames that waited while the process stood still say nothing of their age.
+            // The age of frames that waited while the process was stalled is unknown.
             sent_ns: if waited { 0 } else { since_ns },
             stamp_ns,
             source: self.name,

@@ -1,10 +1,10 @@
-//! The sockets of DDS: keeps them on this host, and keeps away from them what is no RTPS.
+//! The sockets of DDS: restricts them to this host, and filters out datagrams that are not RTPS.
 //!
-//! DDS told to use 127.0.0.1 only still listens on the wildcard address and answers whoever asks: a forged datagram
-//! from another host was taken for data (measured). Bound to `lo`, nothing comes in from elsewhere and nothing leaves.
+//! Even if DDS is told to use only 127.0.0.1, it listens on the wildcard address and answers any host: a forged
+//! datagram from another host was accepted as data (measured). A socket bound to `lo` communicates only on this host.
 //!
-//! A datagram that does not begin as RTPS does is dropped by the kernel, which counts it: DDS has one thread for all
-//! that comes, and tells nobody what it passes over.
+//! The kernel drops and counts datagrams that do not start like RTPS: DDS has one thread for all datagrams, and does
+//! not report those that it skips.
 
 use std::os::fd::OwnedFd;
 
@@ -12,16 +12,16 @@ use rustix::process::{PidfdFlags, PidfdGetfdFlags, pidfd_getfd, pidfd_open};
 use socket2::{Domain, SockFilter, SockRef, Type};
 
 const LOOPBACK: &[u8] = b"lo";
-/// Bit of an interface's flags in sysfs: it carries multicast.
+/// Flag of an interface in sysfs: it supports multicast.
 const IFF_MULTICAST: u32 = 0x1000;
 
-/// Binds every internet datagram socket of this process to `lo`; returns how many there are.
+/// Binds all internet datagram sockets of this process to `lo`; returns their number.
 ///
-/// The option belongs to the socket, so setting it on a duplicate does; a duplicate of an own descriptor is had
-/// without `unsafe` through a descriptor of the own process.
+/// The option belongs to the socket, so it can be set on a duplicate of the descriptor. A pidfd of the own process
+/// gives the duplicate without `unsafe`.
 ///
 /// # Errors
-/// One text, when the kernel does not let it.
+/// One text, when the kernel refuses.
 pub(super) fn bind_to_loopback() -> Result<usize, String> {
     let mut bound = 0;
     for socket in datagram_sockets()? {
@@ -33,9 +33,9 @@ pub(super) fn bind_to_loopback() -> Result<usize, String> {
     Ok(bound)
 }
 
-/// A socket's program in the kernel: a datagram is a header of RTPS 2 and a first submessage that ends within it, or
-/// it is dropped, as one that is too short for a look is. Offsets count from the UDP header, of 8 bytes; jumps, if true
-/// and if not, from the next instruction.
+/// The socket filter: accepts a datagram with a header of RTPS 2 whose first submessage, if any, ends within the
+/// datagram, and drops any other. A load beyond the end of the datagram drops it, too. Offsets count from the UDP
+/// header (8 bytes); jumps (if true, if false) count from the next instruction.
 ///
 /// Source: Linux, Documentation/networking/filter.rst; OMG, DDSI-RTPS 2.5, sections 9.4.4 and 9.4.5.
 const RTPS_ONLY: [SockFilter; 22] = [
@@ -43,11 +43,11 @@ const RTPS_ONLY: [SockFilter; 22] = [
     SockFilter::new(IF_EQUAL, 0, 19, u32::from_be_bytes(*b"RTPS")),
     SockFilter::new(LOAD_BYTE, 0, 0, 12),
     SockFilter::new(IF_EQUAL, 0, 17, 2),
-    // A header of 20 bytes; whether a submessage of at least 4 follows.
+    // The RTPS header has 20 bytes; tests whether a submessage header of 4 bytes follows.
     SockFilter::new(LOAD_LENGTH, 0, 0, 0),
     SockFilter::new(IF_LEAST, 0, 15, 28),
     SockFilter::new(IF_LEAST, 0, 13, 32),
-    // Its length, little-endian where the first of its flags is set.
+    // The length of the submessage, little-endian if bit 0 of its flags is set.
     SockFilter::new(LOAD_BYTE, 0, 0, 29),
     SockFilter::new(IF_SET, 0, 6, 1),
     SockFilter::new(LOAD_BYTE, 0, 0, 31),
@@ -65,7 +65,7 @@ const RTPS_ONLY: [SockFilter; 22] = [
     SockFilter::new(RETURN, 0, 0, 0),
 ];
 
-// Instructions of such programs; there is one register for values, and another one.
+// Opcodes of the filter machine. It has an accumulator and an index register (`OTHER`).
 const LOAD_WORD: u16 = 0x20;
 const LOAD_HALF: u16 = 0x28;
 const LOAD_BYTE: u16 = 0x30;
@@ -81,7 +81,7 @@ const IF_LEAST_OTHER: u16 = 0x3d;
 const IF_SET: u16 = 0x45;
 const RETURN: u16 = 0x06;
 
-/// What the kernel drops of datagrams to this process's sockets.
+/// Datagrams to this process's sockets that the kernel dropped.
 #[derive(Debug, Default)]
 pub(super) struct Drops {
     /// Inode numbers of the sockets.
@@ -89,10 +89,10 @@ pub(super) struct Drops {
 }
 
 impl Drops {
-    /// Lets only RTPS through to every internet datagram socket of this process.
+    /// Attaches the filter to all internet datagram sockets of this process.
     ///
     /// # Errors
-    /// One text, when the kernel does not let it.
+    /// One text, when the kernel refuses.
     pub(super) fn of_rtps_only() -> Result<Self, String> {
         let mut sockets = Vec::new();
         for socket in datagram_sockets()? {
@@ -109,11 +109,11 @@ impl Drops {
         Ok(Self { sockets })
     }
 
-    /// Datagrams dropped since the start: what was no RTPS, and what did not fit into the receive buffers.
+    /// Datagrams dropped since the sockets were opened: not RTPS, or beyond the receive buffers.
     pub(super) fn count(&self) -> u64 {
         let table = std::fs::read_to_string("/proc/self/net/udp").unwrap_or_default();
         let counted = table.lines().skip(1).filter_map(|line| {
-            // .. uid, timeout, inode, references, pointer, drops
+            // Fields from the eighth on: uid, timeout, inode, references, pointer, drops
             let mut fields = line.split_whitespace().skip(9);
             let inode: u64 = fields.next()?.parse().ok()?;
             let drops: u64 = fields.nth(2)?.parse().ok()?;
@@ -140,7 +140,7 @@ fn datagram_sockets() -> Result<Vec<OwnedFd>, String> {
         };
         let copy = match pidfd_getfd(&own, number, PidfdGetfdFlags::empty()) {
             Ok(copy) => copy,
-            // It was closed in between.
+            // The descriptor was closed in between.
             Err(rustix::io::Errno::BADF) => continue,
             Err(e) => {
                 return Err(format!(
@@ -157,7 +157,7 @@ fn datagram_sockets() -> Result<Vec<OwnedFd>, String> {
     Ok(all)
 }
 
-/// Whether `lo` carries the MULTICAST flag: peers then multicast their data out of every interface.
+/// Whether `lo` has the MULTICAST flag: peers then send multicast data on all interfaces.
 pub(super) fn loopback_is_multicast() -> bool {
     let flags = std::fs::read_to_string("/sys/class/net/lo/flags").unwrap_or_default();
     let bits = u32::from_str_radix(flags.trim().trim_start_matches("0x"), 16);
@@ -219,7 +219,7 @@ mod tests {
             b"rtps of another kind, and long".to_vec(),
             with(1, &[9, 1, 2, 0, 5, 5]),
             with(2, &[])[..19].to_vec(),
-            // Longer than what is there, in both orders of bytes.
+            // The first submessage is longer than the datagram, in both byte orders.
             with(2, &[9, 1, 3, 0, 5, 5]),
             with(2, &[9, 0, 0, 3, 5, 5]),
             with(2, &[9, 1, 0, 1, 5, 5]),
@@ -228,7 +228,7 @@ mod tests {
             with(2, &[]),
             with(2, &[9, 1, 2, 0, 5, 5]),
             with(2, &[9, 0, 0, 2, 5, 5]),
-            // To the end, whatever follows.
+            // Length 0: the submessage extends to the end of the datagram.
             with(2, &[21, 1, 0, 0, 5, 5, 5]),
             with(2, &[&[6, 1, 0, 2][..], &[0; 512], &[9, 1, 0, 0]].concat()),
         ];

@@ -1,12 +1,12 @@
-//! What `header.stamp` says: the oldest pose in use on the node's clock. In: a tick. Out: a time that goes with `/tf`.
+//! The value of `header.stamp`: the oldest pose in use, on the node's clock. In: a tick. Out: a time that fits `/tf`.
 //!
-//! Sources may stamp on clocks of their own: a simulator's seconds since its start are no time that a ROS 2 program
-//! could look a transform up for. And one that has fallen silent must not hold the time of the others back for ever.
+//! Sources may use other clocks: with a simulator's seconds since its start, a ROS 2 program cannot look up a
+//! transform. And a source that has fallen silent must not hold the stamp back.
 
 use crate::wire::ros::Time;
 use crate::wire::{Reason, TickRow};
 
-/// Why a body's last pose may be in use though it is none of now.
+/// Reasons with which a body's last pose may be in use although it is not current.
 const OLD: [Reason; 4] = [
     Reason::Stale,
     Reason::Held,
@@ -14,9 +14,9 @@ const OLD: [Reason; 4] = [
     Reason::Rejected,
 ];
 
-/// The oldest stamp of live sources on the node's clock; the node's time where none has any.
+/// The oldest stamp of the live sources on the node's clock; the node's time if they have none.
 ///
-/// On the node's clock are sources that name no other: their frames have `clock_id` 0.
+/// Sources on the node's clock are those that name no other clock: their frames have `clock_id` 0.
 pub(super) fn stamp_of(row: &TickRow, now: Time) -> Time {
     let rows = row.sources.iter().take(usize::from(row.sources_len));
     let is_old = OLD.iter().any(|reason| row.reasons & reason.bit() != 0);
@@ -28,8 +28,8 @@ pub(super) fn stamp_of(row: &TickRow, now: Time) -> Time {
             oldest_ns = Some(oldest_ns.unwrap_or(u64::MAX).min(row.stamp_ns));
         }
     }
-    // Where no other clock is about and nobody is silent, the tick's own word holds bodies that are older than their
-    // source's newest frame, and none whose poses are void.
+    // If all sources use the node's clock and none is silent, the tick's own oldest stamp is used: it includes bodies
+    // older than their source's newest frame, and excludes bodies whose poses are void.
     let stamp_ns = if all_ours {
         Some(row.header.oldest_stamp_ns).filter(|ns| *ns != 0)
     } else {
@@ -42,7 +42,7 @@ pub(super) fn stamp_of(row: &TickRow, now: Time) -> Time {
 mod tests {
     use super::*;
 
-    /// Stamps and clocks of sources, and the oldest of all bodies.
+    /// A tick with the stamps and clocks of sources, and the oldest stamp of all bodies.
     fn row(sources: &[(u64, u32)], oldest_stamp_ns: u64) -> TickRow {
         let mut row = TickRow::default();
         row.header.oldest_stamp_ns = oldest_stamp_ns;
@@ -56,12 +56,12 @@ mod tests {
     #[test]
     fn bug_a_simulators_seconds_and_no_stamp_do_not_stamp_what_ros_2_reads() {
         let stamp = |row: &TickRow| stamp_of(row, Time::from_ns(900)).to_ns();
-        // One clock: the oldest body, which may be older than its source's newest frame.
+        // One clock: the oldest stamp of a body, which may be older than its source's newest frame.
         assert_eq!(stamp(&row(&[(700, 0)], 650)), 650);
         assert_eq!(stamp(&row(&[(700, 0), (0, 0)], 650)), 650);
-        // A simulator beside it.
+        // A simulator's clock in addition.
         assert_eq!(stamp(&row(&[(700, 0), (5, 1)], 5)), 700);
-        // Nothing on the node's clock, or nothing that is not void.
+        // No source on the node's clock, or no valid pose.
         assert_eq!(stamp(&row(&[(700, 0)], 0)), 900);
         assert_eq!(stamp(&row(&[(5, 1)], 5)), 900);
         assert_eq!(stamp(&row(&[(0, 0)], 0)), 900);
@@ -76,7 +76,7 @@ mod tests {
         assert_eq!(stamp(&two), 800);
         two.sources[1].alive = 0;
         assert_eq!(stamp(&two), 900);
-        // A source lives, and one of its bodies does not.
+        // A live source with a body that is not live.
         for reason in [Reason::Stale, Reason::Held, Reason::Rejected] {
             let mut one = row(&[(800, 0)], 100);
             assert_eq!(stamp(&one), 100);

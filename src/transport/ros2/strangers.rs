@@ -1,7 +1,7 @@
-//! Endpoints of another type on a topic of this node. In: what participants say of their readers and writers. Out:
-//! words on each topic where one is, while it is there.
+//! Endpoints on a topic of this node with another message type. In: discovered readers and writers. Out: a text for
+//! each such topic and type, for as long as they exist.
 //!
-//! DDS matches no two endpoints of different types: who sends a wrong type is not heard, and nothing else would tell.
+//! DDS does not match endpoints of different types: messages of a wrong type are not received, and nothing reports it.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use super::told::brief;
 use super::topics::TypeName;
 use crate::config::RosKind;
 
-/// The topics that every node has.
+/// The topics of every node.
 const OWN: [(&str, TypeName); 10] = [
     ("~/transforms", ("sweepd_msgs", "BodyTransforms")),
     ("~/state", ("sweepd_msgs", "State")),
@@ -28,25 +28,25 @@ const OWN: [(&str, TypeName); 10] = [
     ("/clock", ("rosgraph_msgs", "Clock")),
 ];
 
-/// Between two looks, nanoseconds: a look copies what is known of every endpoint in the domain.
+/// Time between two looks, nanoseconds: a look copies the data of every endpoint in the domain.
 const LOOK_NS: u64 = 1_000_000_000;
 
 /// Looks for endpoints of another type.
 pub(super) struct Strangers {
     context: Context,
-    /// The type of each topic, both as DDS names them.
+    /// The type of each topic, both with their DDS names.
     own: BTreeMap<String, String>,
-    /// What the last look found, and when it was, nanoseconds of `CLOCK_BOOTTIME`.
+    /// Result of the last look, and its time, nanoseconds of `CLOCK_BOOTTIME`.
     found: Vec<String>,
     looked_ns: u64,
 }
 
 impl Strangers {
-    /// A look-out on the topics of a node and of its sources.
+    /// Watches the topics of a node and of its sources.
     pub(super) fn of(context: &Context, names: &Names, scene: &RosScene) -> Self {
         let mut own = BTreeMap::new();
         let mut put = |name: &str, (package, kind): TypeName| {
-            // A name that is none has no topic.
+            // An invalid name has no topic.
             if let Ok(full) = names.resolve(name) {
                 let kind = MessageTypeName::new(package, kind).dds_msg_type();
                 own.insert(format!("rt{full}"), kind);
@@ -77,7 +77,7 @@ impl Strangers {
         watch
     }
 
-    /// Takes the topic of a body, by its full name.
+    /// Adds the topic of a body, by its full name.
     pub(super) fn meet(&mut self, topic: &str, kind: RosKind) {
         let (package, kind) = match kind {
             RosKind::Pose => ("geometry_msgs", "PoseStamped"),
@@ -88,17 +88,17 @@ impl Strangers {
         self.own.insert(format!("rt{topic}"), kind);
     }
 
-    /// The topic of a body that has left, by its full name, is nothing to this node any more.
+    /// Removes the topic of a body that was removed, by its full name.
     pub(super) fn part(&mut self, topic: &str) {
         self.own.remove(&format!("rt{topic}"));
     }
 
-    /// What is so now.
+    /// The texts of the last look.
     pub(super) fn found(&self) -> &[String] {
         &self.found
     }
 
-    /// Looks once a second; what is new.
+    /// Looks once per second; returns the texts that are new.
     pub(super) fn watch(&mut self, now_ns: u64) -> Vec<String> {
         if now_ns.saturating_sub(self.looked_ns) < LOOK_NS {
             return Vec::new();
@@ -110,7 +110,7 @@ impl Strangers {
         new.cloned().collect()
     }
 
-    /// A line a topic and type.
+    /// One text per topic and type.
     fn look(&self) -> Vec<String> {
         let participant = self.context.domain_participant();
         let here = participant.guid().prefix;
@@ -146,7 +146,7 @@ impl Strangers {
     }
 }
 
-/// A type as ROS users write it.
+/// A DDS type name as ROS users write it.
 fn as_ros(kind: &str) -> String {
     let plain = kind.replace("::dds_::", "/").replace("::", "/");
     plain.strip_suffix('_').unwrap_or(&plain).to_owned()

@@ -1,6 +1,6 @@
-//! The tree of `/tf`: links between frames, and what becomes of each that comes; poses by chains of links: `chain`.
+//! The tree of `/tf`: links between frames, and how each new link is taken. Poses by chains of links are in `chain`.
 //!
-//! In: links as they come, frames of bodies. Out: the newest link of each frame. Pure: no DDS beyond the names of
+//! In: links as they arrive, frames of bodies. Out: the newest link of each frame. Pure: nothing of DDS but the GIDs of
 //! publishers.
 
 mod chain;
@@ -20,75 +20,75 @@ pub(super) use crate::wire::ros::plain_frame as plain;
 pub(super) use chain::{Found, Missing};
 use room::FRAME_NAME_BYTES_MAX;
 
-/// A link: where a frame is in its parent.
+/// A link: the pose of a frame in its parent.
 #[derive(Clone, Debug)]
 struct Link {
     parent: usize,
     position: [f64; 3],
     orientation: [f64; 4],
-    /// `None`: its numbers are no pose.
+    /// `None`: the numbers are not a pose.
     pose: Option<Pose>,
     /// Sender's stamp, nanoseconds.
     stamp_ns: u64,
-    /// Its stamps so far.
+    /// Order of its stamps.
     order: Order,
     /// Receipt, nanoseconds of `CLOCK_BOOTTIME`.
     received_ns: u64,
-    /// It came as one that never changes, and has no age.
+    /// Whether it is a fixed link: it never changes and has no age.
     fixed: bool,
-    /// How many looks there had been when it came.
+    /// Number of looks before it arrived.
     looks: u64,
 }
 
-/// What became of a link.
+/// Result of taking a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Taken {
-    /// It is the newest of its frame.
+    /// The link is the newest of its frame.
     Newer,
-    /// One with a stamp later by so much is there already, nanoseconds; it is passed over.
+    /// The link is older than the newest one of its frame by so many nanoseconds, and is skipped.
     Older(u64),
-    /// Its sender's time began anew, and a body hangs on it.
+    /// The sender's clock restarted, and the pose of a body depends on the link.
     WentBack,
-    /// It links no two frames, and why.
+    /// The link does not join two valid frames; the reason.
     Refused(&'static str),
-    /// A frame too many.
+    /// There is no room for a new frame.
     Full,
 }
 
-/// A frame that a body has or that was heard of.
+/// A frame of a body or of a link.
 #[derive(Clone, Debug, Default)]
 struct Frame {
     name: String,
     link: Option<Link>,
-    /// Who sends its link.
+    /// Publishers of its link.
     heard: Heard,
-    /// Who sent it as one that never changes.
+    /// Publisher of its newest fixed link.
     fixed_by: Option<Gid>,
-    /// How many bodies, and the scene, have it as theirs: it stays while there is one.
+    /// Number of bodies with this frame, plus one if it is the scene's; the frame stays while this is not 0.
     pins: usize,
 }
 
-/// The links that were heard.
+/// The frames and their newest links.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tree {
     ids: BTreeMap<String, usize>,
     frames: Vec<Frame>,
-    /// Numbers of frames that have gone.
+    /// Indices of removed frames.
     free: Vec<usize>,
-    /// Frames that bodies or the scene have.
+    /// Number of pinned frames: those of bodies and of the scene.
     pinned: usize,
-    /// The scene's frame; `None`: not said.
+    /// The scene's frame; `None`: not set.
     root: Option<usize>,
     /// Links refused since room was last made.
     denied: usize,
-    /// Links that never change which had to go.
+    /// Fixed links dropped for lack of room, since the last call that took the number.
     let_go: u64,
-    /// How often all bodies were looked for.
+    /// Number of looks at all bodies.
     looks: u64,
 }
 
 impl Tree {
-    /// An empty one, and the number of the scene's frame in it.
+    /// Creates a tree with the scene's frame; returns the tree and the index of that frame.
     pub(super) fn rooted(frame: &str) -> (Self, usize) {
         let mut tree = Self::default();
         let root = tree.pin(frame);
@@ -96,8 +96,8 @@ impl Tree {
         (tree, root)
     }
 
-    /// The number of a frame that a body or the scene has. It is never refused, and stays until it is unpinned: the
-    /// scene bounds how many there are.
+    /// Pins the frame of a body or the scene and returns its index. It is never refused, and stays until it is
+    /// unpinned: the scene limits the number of such frames.
     pub(super) fn pin(&mut self, frame: &str) -> usize {
         let id = self.id(plain(frame));
         if let Some(frame) = self.frames.get_mut(id) {
@@ -107,7 +107,7 @@ impl Tree {
         id
     }
 
-    /// A body that has this frame has left.
+    /// Unpins the frame of a removed body.
     pub(super) fn unpin(&mut self, frame: usize) {
         if let Some(frame) = self.frames.get_mut(frame).filter(|frame| frame.pins > 0) {
             frame.pins -= 1;
@@ -115,7 +115,7 @@ impl Tree {
         }
     }
 
-    /// The number of a frame, a new one if need be.
+    /// The index of a frame, which is added if it is new.
     fn id(&mut self, frame: &str) -> usize {
         if let Some(&id) = self.ids.get(frame) {
             return id;
@@ -131,7 +131,7 @@ impl Tree {
         id
     }
 
-    /// Takes who sent the link of a frame; whether another one sends it, too.
+    /// Notes the publisher of a frame's link; returns whether another one sends it, too.
     pub(super) fn hear(&mut self, child: &str, from: Gid, now_ns: u64) -> bool {
         let id = self.ids.get(plain(child));
         let frame = id.and_then(|id| self.frames.get_mut(*id));
@@ -141,14 +141,14 @@ impl Tree {
         })
     }
 
-    /// Whether the link of a frame that is there is one that never changes, and this is none, or the other way round.
+    /// Whether the frame has a fixed link and this one is not fixed, or the reverse.
     pub(super) fn is_otherwise(&self, child: &str, fixed: bool) -> bool {
         let id = self.ids.get(plain(child));
         let link = id.and_then(|id| self.link(*id));
         link.is_some_and(|link| link.fixed != fixed)
     }
 
-    /// Whether a fixed link differs from that of its frame which another publisher sent.
+    /// Whether a fixed link differs from its frame's current one, which another publisher sent.
     pub(super) fn is_disputed(&self, link: &TransformStamped, from: Gid) -> bool {
         let id = self.ids.get(plain(&link.child_frame_id));
         let Some((frame, old)) = id.and_then(|&id| Some((self.frames.get(id)?, self.link(id)?)))
@@ -162,7 +162,7 @@ impl Tree {
         old.fixed && !is_same && frame.fixed_by.is_some_and(|by| by != from)
     }
 
-    /// A publisher has sent a fixed link of a frame, and it was taken.
+    /// Notes the publisher of a fixed link that was taken.
     pub(super) fn note_fixed(&mut self, child: &str, from: Gid) {
         let id = self.ids.get(plain(child));
         if let Some(frame) = id.and_then(|id| self.frames.get_mut(*id)) {
@@ -170,12 +170,12 @@ impl Tree {
         }
     }
 
-    /// Bodies are looked for: what came until now is no news any more.
+    /// Starts a look at all bodies: links received until now are no longer news.
     pub(super) fn note_look(&mut self) {
         self.looks += 1;
     }
 
-    /// Whether the link of a frame has come since the last look, and changes.
+    /// Whether the link of a frame is not fixed and arrived since the last look.
     pub(super) fn is_news(&self, child: &str) -> bool {
         let id = self.ids.get(plain(child));
         let link = id.and_then(|id| self.link(*id));
@@ -186,7 +186,7 @@ impl Tree {
         self.frames.get(frame)?.link.as_ref()
     }
 
-    /// Forgets every link that has an age.
+    /// Drops all links that are not fixed.
     pub(super) fn forget(&mut self) {
         for frame in &mut self.frames {
             frame.link.take_if(|link| !link.fixed);
@@ -195,7 +195,7 @@ impl Tree {
 
     /// Takes a link.
     ///
-    /// * `timeout_ns` - of its source, which tells late ones from those of a clock that began anew (`order`).
+    /// * `timeout_ns` - time-out of its source, which tells late links from those of a restarted clock (see `order`).
     pub(super) fn take(
         &mut self,
         link: &TransformStamped,
@@ -224,7 +224,7 @@ impl Tree {
             match step {
                 Step::On => {}
                 Step::Late(by_ns) => return Taken::Older(by_ns),
-                // The clock of a frame that no body hangs on, such as what a camera detects, is nothing to bodies.
+                // A restarted clock of a frame that no body depends on, such as a camera's detection, is ignored.
                 Step::Anew if self.is_needed(child) => {
                     taken = Taken::WentBack;
                     self.forget();
@@ -252,7 +252,7 @@ impl Tree {
     }
 }
 
-/// Why these are no two frames that can be linked, if they are none.
+/// Why a link between these frames is refused, if it is.
 fn unfit(child: &str, parent: &str) -> Option<&'static str> {
     const { assert!(FRAME_NAME_BYTES_MAX == 255, "it is in the words below") };
     if child.is_empty() {
@@ -268,7 +268,7 @@ fn unfit(child: &str, parent: &str) -> Option<&'static str> {
     }
 }
 
-/// The pose of numbers as they come, or what is wrong with them.
+/// The pose of raw numbers, or why they are not a pose.
 pub(super) fn sound(position: [f64; 3], orientation: [f64; 4]) -> Result<Pose, RejectReason> {
     if !position.iter().chain(&orientation).all(|v| v.is_finite()) {
         return Err(RejectReason::NotFinite);
@@ -280,7 +280,7 @@ pub(super) fn sound(position: [f64; 3], orientation: [f64; 4]) -> Result<Pose, R
     pose_from(position, orientation).ok_or(RejectReason::BadQuaternion)
 }
 
-/// Words for numbers that are no pose, and what to write instead.
+/// Text for numbers that are not a pose, with the fix.
 pub(super) fn no_pose(reason: RejectReason) -> String {
     format!("no pose: {reason}: {}", reason.mend())
 }

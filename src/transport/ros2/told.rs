@@ -1,29 +1,29 @@
-//! What people were told a moment ago, so that they are told what is new. In: words and when they hold. Out: whether
-//! they are news. Pure.
+//! Remembers recently reported texts, so that only new ones are reported. In: texts and times. Out: whether a text is
+//! new. Pure.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-/// Words that have not held for so long are news again, nanoseconds: longer than what passes is told of.
+/// A text that has not applied for this long is new again, nanoseconds; longer than passing faults are reported.
 const FORGOTTEN_NS: u64 = 10_000_000_000;
-/// Between two times that the same happens over and over, and is said, nanoseconds.
+/// Least time between two reports of the same repeated event, nanoseconds.
 const AGAIN_NS: u64 = 1_000_000_000;
-/// Longest name of somebody else's in words, bytes: a name may be as long as a message.
+/// Longest foreign name in a text, bytes: a name may be as long as a message.
 const NAME_BYTES_MAX: usize = 128;
 
-/// What was told, without its numbers, and when it last held, nanoseconds of `CLOCK_BOOTTIME`. Who tells says a few
-/// words each half second, or those of a source of the scene, so what is not forgotten yet has a bound.
+/// Recent texts without their numbers, and when they last applied, nanoseconds of `CLOCK_BOOTTIME`. Most callers report
+/// a few texts per half second, or texts about sources; texts about shortened responses come at the rate of requests.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Told(BTreeMap<String, u64>);
 
 impl Told {
-    /// Whether a state of things is news: it holds now, and did not a while ago.
+    /// Whether a state is new: it applies now, and did not recently.
     pub(super) fn is_new(&mut self, words: &str, now_ns: u64) -> bool {
         self.forget(now_ns);
         self.0.insert(gist(words), now_ns).is_none()
     }
 
-    /// Whether something that happens is to be said: it was not a second ago.
+    /// Whether an event must be reported: the last report of it is at least one second old.
     pub(super) fn is_due(&mut self, words: &str, now_ns: u64) -> bool {
         self.forget(now_ns);
         let last_ns = self.0.entry(gist(words)).or_default();
@@ -40,7 +40,7 @@ impl Told {
     }
 }
 
-/// Words without numbers such as `3.002`, which differ from one look to the next.
+/// A text without decimal numbers such as `3.002`, which differ from one look to the next.
 pub(super) fn gist(words: &str) -> String {
     let mut gist = String::with_capacity(words.len());
     for word in words.split(' ') {
@@ -52,7 +52,7 @@ pub(super) fn gist(words: &str) -> String {
     gist
 }
 
-/// A name for people: the head of one that is too long, on one line.
+/// A name for messages: on one line, and cut if it is too long.
 pub(super) fn brief(name: &str) -> Cow<'_, str> {
     if name.len() <= NAME_BYTES_MAX {
         return plain(name);
@@ -61,8 +61,8 @@ pub(super) fn brief(name: &str) -> Cow<'_, str> {
     Cow::Owned(format!("{}..", plain(head.unwrap_or_default())))
 }
 
-/// Control characters as they are written in code: a peer's line feed would begin a line of the log, and an escape
-/// speaks to the terminal.
+/// Escapes control characters: a line feed in a foreign name would start a new line of the log, and an escape sequence
+/// would control the terminal.
 fn plain(name: &str) -> Cow<'_, str> {
     if !name.contains(char::is_control) {
         return Cow::Borrowed(name);
@@ -94,7 +94,7 @@ mod tests {
             }
         }
         assert_eq!(said, [0]);
-        // Two that take turns are each said once.
+        // Two states that alternate are each reported once.
         let mut two =
             |look: u64, name| told.is_new(&format!("body {name}: 0.100 s"), 31 * S + look * S);
         let said = (0..9).map(|look| two(look, if look % 2 == 0 { "a1" } else { "a2" }));

@@ -1,4 +1,4 @@
-//! Topics with their types and qualities of service. In: full names. Out: publishers and subscriptions of a node.
+//! Topics with their types and quality of service. In: full names. Out: publishers and subscriptions of a node.
 
 use ros2_client::qos::{History, QosProfile, WhenFull};
 use ros2_client::{MessageTypeName, Node, Publisher, Subscription};
@@ -11,41 +11,41 @@ use std::time::Duration;
 use crate::error::{Error, Result};
 use crate::time::{Clock as _, SystemClock};
 
-/// Bytes of unacknowledged messages that one reliable topic may keep: a reader that has stopped is given up by its
-/// lease after 20 s, and until then must cost no more than this.
+/// Bytes of unacknowledged messages that a reliable topic may keep. DDS drops a stopped reader only when its lease ends
+/// after 20 s; until then it must not cost more memory than this.
 const UNACKED_BYTES_MAX: usize = 8 << 20;
-/// Unacknowledged messages that one topic may keep, however small.
+/// Unacknowledged messages that a topic may keep, however small they are.
 const UNACKED_MAX: usize = 1 << 14;
-/// Lease of liveliness, offered where silence must be told: shorter ones flap, because the crate asserts once a second.
+/// Lease of liveliness, where silence must be detected. Shorter leases flap, because `rustdds` asserts once per second.
 const LEASE: Duration = Duration::from_secs(3);
 
-/// Time between two tries to open a reader for which DDS has no room yet; it empties a full queue in about that time.
-/// Each failed try is taken back through a queue of four, which may block for 20 ms.
+/// Time between two attempts to open a reader for which DDS has no room; DDS empties a full queue in about this time.
+/// Each failed attempt is reverted through a queue of four, which may block for 20 ms.
 const AGAIN: Duration = Duration::from_millis(10);
-/// What DDS says of it. New readers wait for its thread in a queue of 100 (rustdds 0.15), and one more is refused at
-/// once; new writers wait until they are taken.
+/// Error text of DDS for a full queue. New readers wait for the DDS thread in a queue of 100 (rustdds 0.15), and one
+/// more is refused at once; new writers wait until they are taken.
 const FULL: &str = "full channel";
 
 /// A topic's package and type, such as `sweepd_msgs` and `Tick`.
 pub(super) type TypeName = (&'static str, &'static str);
 
-/// How a topic goes out.
+/// Quality of service of a published topic.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Out {
     /// Whether lost messages are sent again.
     pub(super) reliable: bool,
-    /// Whether late joiners get the last one.
+    /// Whether late joiners get the last message.
     pub(super) latched: bool,
-    /// Two heartbeats, where silence must be told.
+    /// Deadline of two heartbeats, where silence must be detected.
     pub(super) deadline: Option<Duration>,
-    /// Messages kept for late joiners and repairs.
+    /// Messages kept for late joiners and retransmission.
     pub(super) depth: usize,
-    /// Bytes of a message at its largest, for the bound of what is kept.
+    /// Largest size of a message, bytes, for the limit of unacknowledged ones.
     pub(super) bytes: usize,
 }
 
 impl Out {
-    /// Reliable, nothing kept.
+    /// Reliable, with nothing kept for late joiners.
     pub(super) const RELIABLE: Self = Self {
         reliable: true,
         latched: false,
@@ -58,7 +58,7 @@ impl Out {
         let profile =
             QosProfile::publisher_default().history(History::KeepLast { depth: self.depth });
         let profile = if self.reliable {
-            // A full window is this node's loss, never its wait.
+            // A full window loses messages of this node, but must never block it.
             profile.reliability_reliable(WhenFull::Fail)
         } else {
             profile.reliability_best_effort()
@@ -76,29 +76,29 @@ impl Out {
         }
     }
 
-    /// Messages that may wait for acknowledgement.
+    /// Number of messages that may wait for acknowledgement.
     pub(super) fn window(self) -> usize {
         (UNACKED_BYTES_MAX / self.bytes.max(1)).clamp(self.depth.max(16), UNACKED_MAX)
     }
 }
 
-/// How a topic comes in.
+/// Quality of service of a subscribed topic.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct In {
-    /// Whether it asks for lost messages again; such a reader does not match best-effort writers.
+    /// Whether it requests lost messages again; a reliable reader does not match best-effort writers.
     pub(super) reliable: bool,
-    /// Whether it asks for what was said before it came.
+    /// Whether it requests messages sent before it existed.
     pub(super) latched: bool,
-    /// Messages that may wait.
+    /// Messages that may wait to be read.
     pub(super) depth: usize,
-    /// How long to wait for room among the new readers that DDS has not taken yet.
+    /// Longest wait for room in the DDS queue of new readers.
     pub(super) patience: Duration,
 }
 
 impl In {
-    /// Before the first tick, for which nobody waits.
+    /// Before the first tick, when no thread waits.
     pub(super) const AT_START: Duration = Duration::from_secs(2);
-    /// Beside ticks, which the same thread publishes: one more try.
+    /// During operation, on the thread that publishes ticks: one more attempt.
     pub(super) const BESIDE_TICKS: Duration = Duration::from_millis(6);
 
     fn profile(self) -> QosProfile {
@@ -157,10 +157,10 @@ pub(super) fn subscription<M: DeserializeOwned + 'static>(
         .map_err(|e| failed(full, e))
 }
 
-/// Makes something with a reader, and again while DDS has no room for another new one.
+/// Creates something with a reader; retries while the DDS queue of new readers is full.
 ///
 /// # Errors
-/// Those of the last try.
+/// The error of the last attempt.
 pub(super) fn patiently<T, E: std::fmt::Display>(
     patience: Duration,
     mut make: impl FnMut() -> std::result::Result<T, E>,
@@ -199,7 +199,7 @@ fn topic(
         .map_err(|e| failed(full, e))
 }
 
-/// What DDS said of a topic or service.
+/// The error of a topic or service that could not be opened.
 pub(super) fn failed(name: &str, e: impl std::error::Error + Send + Sync + 'static) -> Error {
     Error::io(format!("ROS 2: {name} cannot be opened"), e)
 }

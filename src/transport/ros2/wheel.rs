@@ -1,17 +1,18 @@
-//! A reliable topic that one reader cannot hold up: a reader that comes is waited for until it has caught up, and where
-//! one has stopped, a new writer takes the place of the one that is full of what it has not acknowledged.
+//! A reliable topic that one reader cannot block. A new reader is waited for until it has caught up. If a reader has
+//! stopped, a new writer replaces the one that is full of messages that the reader has not acknowledged.
 //!
-//! DDS keeps what a reliable reader has not acknowledged, and a reader that was stopped is given up only by its lease
-//! (20 s with Fast DDS); until then a bounded writer takes nothing more for anybody. Best effort would not do: plain
-//! subscribers ask for reliable topics. Larger bounds would not do: 5 MB/s for 20 s is 100 MB a stopped reader.
+//! DDS keeps messages until each reliable reader has acknowledged them, and drops a stopped reader only when its lease
+//! ends (20 s with Fast DDS); until then a bounded writer takes no more messages for any reader. Refused: best effort,
+//! because plain subscribers request reliable topics; larger limits, because 5 MB/s for 20 s is 100 MB per stopped
+//! reader.
 //!
-//! Who has just come has acknowledged nothing, and all that was ever sent counts against it: a writer that has sent
-//! more than its window takes nothing until the first acknowledgement is there, some 100 ms.
+//! A new reader has acknowledged nothing, and all messages ever sent count against it: a writer that has sent more than
+//! its window takes no message until the first acknowledgement arrives, after some 100 ms.
 //!
-//! In: messages. Out: the same, in their order, on a writer that has room; what none takes yet is held. The writer that
-//! is full stays until the next turn, so that what is on its way to the healthy readers is not lost. Readers do not
-//! hear a new writer for some 170 ms (measured: what was sent in that time was lost), so one is made in advance, and is
-//! gone over to when it has the readers of the old one and they have had time to find it.
+//! In: messages. Out: the same in order, on a writer with room; messages that no writer takes yet are held. A full
+//! writer is kept until the next turn, so that its messages on the way to healthy readers are not lost. Readers do not
+//! hear a new writer for some 170 ms (measured: messages sent in that time were lost). So the next writer is made in
+//! advance, and becomes current when it has the readers of the old one and they have had time to find it.
 
 use std::collections::VecDeque;
 
@@ -22,40 +23,40 @@ use super::readers::Readers;
 use super::topics::{Out, TypeName, publisher};
 use crate::error::Result;
 
-/// Least time between two turns, nanoseconds: where a new writer is full at once, the network is, and no turn helps.
+/// Least time between two turns, nanoseconds: if a new writer fills at once, the network is full, and no turn helps.
 const TURN_NS: u64 = 250_000_000;
-/// A reader that came within this time catches up, nanoseconds; after it, it is taken for one that has stopped.
+/// Time for a new reader to catch up, nanoseconds; after it, a reader that does not acknowledge counts as stopped.
 pub(super) const CATCH_UP_NS: u64 = 1_000_000_000;
-/// How long readers have to find a writer that knows them, nanoseconds: twice what was measured.
+/// Time for readers to find a writer that has matched them, nanoseconds: twice the measured time.
 const FOUND_NS: u64 = 350_000_000;
-/// A writer that has been full for so long is left for one that lacks readers, too, nanoseconds.
+/// Time after which a full writer is replaced even by one that lacks readers, nanoseconds.
 const FULL_NS: u64 = 3_000_000_000;
-/// Messages that wait for a writer with room, at least: at 100 Hz those of two seconds.
+/// Least limit of messages held for a writer with room: over two seconds at 100 Hz.
 const HELD_MIN: usize = 256;
 
-/// A topic's writer, the one before, and the one after.
+/// The current writer of a topic, the previous one, and the next one.
 pub(super) struct Wheel<M: Serialize> {
     current: Publisher<M>,
     before: Option<Publisher<M>>,
-    /// Made in advance, while a reader is stuck.
+    /// Made in advance, while a reader blocks a writer.
     next: Option<Publisher<M>>,
-    /// What no writer has taken yet, the oldest first.
+    /// Messages that no writer has taken yet, oldest first.
     held: VecDeque<M>,
-    /// Since when the writer has been full, nanoseconds.
+    /// Since when the current writer has been full, nanoseconds of `CLOCK_BOOTTIME`.
     full_ns: Option<u64>,
-    /// Whether a reader held a writer up that had caught up with it.
+    /// Whether a reader that should have caught up blocks a writer.
     stuck: bool,
-    /// Messages on the current writer since it was new, or full.
+    /// Messages on the current writer since it became current, or was last full.
     sent: usize,
     full_name: String,
     kind: TypeName,
     out: Out,
     turned_ns: u64,
-    /// Since it was asked last.
+    /// Messages lost since the last call of [`Self::take_lost`].
     lost: u64,
 }
 
-/// What it takes to publish.
+/// Resources for publishing.
 pub(super) struct Means<'a> {
     pub(super) node: &'a mut Node,
     pub(super) context: &'a Context,
@@ -64,14 +65,14 @@ pub(super) struct Means<'a> {
     pub(super) now_ns: u64,
 }
 
-/// What became of messages.
+/// Result of publishing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Sent {
-    /// Lost, or on a writer whose readers are those of another one.
+    /// Messages lost, or sent on a writer without readers while another writer of the topic has some.
     pub(super) lost: u64,
-    /// So many at most were lost by a reader that does not acknowledge, with the last writer but one.
+    /// Upper bound of the messages that a stopped reader lost with the writer before the previous one.
     pub(super) given_up: u64,
-    /// A new writer goes on.
+    /// Whether a new writer became current.
     pub(super) turned: bool,
 }
 
@@ -102,7 +103,7 @@ impl<M: Serialize> Wheel<M> {
         })
     }
 
-    /// Whether somebody listens. A new writer is known to its readers a little later than the old one was.
+    /// Whether the topic has readers. A new writer matches its readers a little later than the old one did.
     pub(super) fn is_read(&self, readers: &Readers) -> bool {
         readers.count(&self.current) > 0 || self.is_read_beside(readers)
     }
@@ -112,13 +113,13 @@ impl<M: Serialize> Wheel<M> {
         beside.any(|writer| readers.count(writer) > 0)
     }
 
-    /// Whether messages wait for a writer with room.
+    /// Whether messages are held for a writer with room.
     pub(super) fn holds(&self) -> bool {
         !self.held.is_empty()
     }
 
-    /// Sets whether lost messages are sent again, which a writer keeps for its life: another one takes its place. Where
-    /// DDS makes none, the old one stays until the next call.
+    /// Sets whether lost messages are sent again. That is fixed for the life of a writer, so a new writer replaces all.
+    /// If DDS creates none, the old one stays until the next call.
     pub(super) fn set_reliable(&mut self, with: &mut Means<'_>, reliable: bool) {
         if self.out.reliable == reliable {
             return;
@@ -137,12 +138,12 @@ impl<M: Serialize> Wheel<M> {
         }
     }
 
-    /// Its topic, and what was lost since the last call.
+    /// The name of the topic, and the messages lost since the last call.
     pub(super) fn take_lost(&mut self) -> (String, u64) {
         (self.full_name.clone(), std::mem::take(&mut self.lost))
     }
 
-    /// Publishes behind what is held.
+    /// Publishes a message after those that are held.
     pub(super) fn publish(&mut self, message: M, with: &mut Means<'_>) -> Sent {
         if self.stuck && self.next.is_none() && self.sent >= self.out.window() / 2 {
             self.next = self.make(with.node, with.context);
@@ -158,7 +159,7 @@ impl<M: Serialize> Wheel<M> {
         }
     }
 
-    /// Publishes what is held, on a new writer if need be.
+    /// Publishes the held messages, on a new writer if needed.
     pub(super) fn flush(&mut self, with: &mut Means<'_>) -> Sent {
         let mut sent = Sent::default();
         while let Some(message) = self.held.pop_front() {
@@ -181,12 +182,12 @@ impl<M: Serialize> Wheel<M> {
         sent
     }
 
-    /// The writer has taken one.
+    /// Notes that the current writer took a message.
     fn go_on(&mut self, readers: &mut Readers) {
         self.full_ns = None;
         self.sent += 1;
         if self.sent > 2 * self.out.window() {
-            // Everybody acknowledges again.
+            // Two windows were accepted, so all readers acknowledge again.
             self.stuck = false;
             if let Some(next) = self.next.take() {
                 readers.forget(next.guid());
@@ -194,10 +195,10 @@ impl<M: Serialize> Wheel<M> {
         }
     }
 
-    /// The writer is full: goes over to the next one, or says that it is too early.
+    /// Replaces a full writer by the next one; returns `false` if it is too early for that.
     fn turn(&mut self, with: &mut Means<'_>, sent: &mut Sent) -> bool {
         let now_ns = with.now_ns;
-        // Why it is full may be a reader that has not been heard of here yet.
+        // The writer may be full because of a new reader whose match event has not been read yet.
         let Some(full_ns) = self.full_ns else {
             self.full_ns = Some(now_ns);
             return false;

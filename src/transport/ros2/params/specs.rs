@@ -1,4 +1,4 @@
-//! The parameters there are, with their values as a scene has them, what they take, and when.
+//! The table of parameters: initial values from a scene, accepted values, and when each may be set.
 
 use super::super::RosScene;
 use super::Value;
@@ -6,14 +6,14 @@ use super::rules::{Rule, milliseconds};
 use crate::config::Config;
 use crate::limits;
 
-/// What -1 stands for.
+/// Meaning of -1 where a parameter has no limit.
 const NO_LIMIT: &str = "no limit";
-/// Rows of a tick on a large topic: 500 of `~/pairs` take 88 KB. Readers have receive buffers of 208 KB by default,
-/// half of which datagrams fill: with 750 rows, 132 KB, reliable messages came seconds late, and ticks were lost.
+/// Default row limit of a tick on a large topic; 500 rows of `~/pairs` take 88 KB. Default receive buffers hold 208 KB,
+/// half of it usable by datagrams: with 750 rows (132 KB) reliable messages came seconds late, and ticks were lost.
 const ROWS_DEFAULT: i64 = 500;
-/// Longest time a parameter can name, milliseconds: a day.
+/// Largest time of a parameter, milliseconds: one day.
 const TIME_MS_MAX: f64 = 86_400_000.0;
-/// Most rows a tick may have on a topic: 20 MB of contacts.
+/// Largest row limit of a tick on a topic: 20 MB of contacts.
 const ROWS_MAX: i64 = 100_000;
 
 /// When a parameter may be set.
@@ -21,9 +21,9 @@ const ROWS_MAX: i64 = 100_000;
 pub(super) enum When {
     /// At any time.
     Always,
-    /// While running only with `ros.allow_edits`.
+    /// At the start; while running only with `ros.allow_edits`.
     IfAllowed,
-    /// At the start.
+    /// Only at the start.
     AtStart,
 }
 
@@ -31,9 +31,9 @@ pub(super) enum When {
 #[derive(Clone, Debug)]
 pub(super) struct Spec {
     pub(super) name: String,
-    /// What it is at the start.
+    /// Value at the start.
     pub(super) value: Value,
-    /// What it is for, for whoever asks.
+    /// Description for `describe_parameters`.
     pub(super) about: &'static str,
     pub(super) rule: Rule,
     pub(super) when: When,
@@ -51,7 +51,7 @@ impl Spec {
     }
 }
 
-/// What touches the daemon's promises.
+/// Parameters that affect the guarantees of the daemon.
 fn of_daemon(config: &Config) -> Vec<Spec> {
     let time_ms = |none| Rule::Real {
         min: 0.0,
@@ -103,7 +103,7 @@ fn of_daemon(config: &Config) -> Vec<Spec> {
     ]
 }
 
-/// What is the node's own.
+/// Parameters of the node itself.
 fn of_node() -> Vec<Spec> {
     let rows = || Rule::Whole {
         max: ROWS_MAX,
@@ -146,7 +146,7 @@ fn of_node() -> Vec<Spec> {
         flag(markers, true, always),
         flag(collisions, false, always),
         flag(allow, false, at_start),
-        // A clock that goes back ends every pair.
+        // With simulated time, a `/clock` that goes back ends every pair.
         flag(sim_time, false, When::IfAllowed),
     ]
 }

@@ -1,4 +1,4 @@
-//! Which values parameters take, when, and what they do.
+//! Accepted values of parameters, when they may be set, and their effects.
 
 use super::*;
 use crate::transport::ros2::RosSourceSpec;
@@ -145,7 +145,7 @@ fn bug_a_node_opened_anew_does_not_undo_margins_that_were_edited_since() {
     let first = Table::of(&scene);
     assert_eq!(margin(&first, -1.0), Effect::None, "as the bodies are");
     assert_eq!(margin(&first, 0.3), sets(Some(0.3)), "said at the start");
-    // Opened anew with the same words, and after others were set.
+    // The node is reopened with the same arguments, and after another value was set.
     assert_eq!(margin(&Table::of(&scene), 0.3), Effect::None);
     first.run();
     assert_eq!(margin(&first, 0.2), sets(Some(0.2)));

@@ -1,4 +1,4 @@
-//! What goes out of a tick, and which ticks give way.
+//! Which rows of a tick are published, and which ticks are dropped.
 
 use super::*;
 
@@ -174,7 +174,7 @@ fn bug_ticks_alone_pushed_out_the_rows_and_events_of_the_tick_before() {
     assert_eq!((first.tick.header.tick, first.pairs.len()), (1, 3));
     let second = next(&parcels);
     assert_eq!((second.tick.header.tick, second.done), (5, false));
-    // Where both that wait have rows, the one alone goes; those with rows push out one another.
+    // If both waiting parcels have rows, the tick without rows is dropped; parcels with rows drop the oldest of them.
     parcels.put(&outbox(6), Demand::ALL, CAPS);
     parcels.put(&outbox(7), Demand::ALL, CAPS);
     assert_eq!(parcels.put_tick(&outbox(8).tick), 1);

@@ -1,11 +1,11 @@
-//! What a chain of links says of its body. Pure.
+//! The verdict on a chain of links: pose, refusal or nothing. Pure.
 
 use super::super::tf::{Found, Missing, no_pose};
 use super::super::told::brief;
 use super::seconds;
 use crate::wire::{RejectReason, TransformRow};
 
-/// What a chain says of its body: a pose, a refusal, or nothing yet; and the fault in words.
+/// The result for the body of a chain: a pose, a refusal, or `None` if it has not been received; and the fault as text.
 pub(super) fn judge(
     found: &Result<Found, Missing>,
     now_ns: u64,
@@ -37,7 +37,7 @@ pub(super) fn judge(
             };
             (Some(Ok(row)), None)
         }
-        // Nobody has said where it is: it is not received, which is no refusal.
+        // No chain has been received yet, which is not a refusal.
         Err(Missing::Frame(frame)) => (
             None,
             Some(format!(

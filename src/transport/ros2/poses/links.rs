@@ -1,4 +1,4 @@
-//! Links of `/tf` as they come to a source. In: messages. Out: the tree; what is odd about who sends them, in words.
+//! Takes links of `/tf` into a source. In: messages. Out: the tree; faults of links and their senders, as text.
 
 use super::super::tf::Taken;
 use super::stamps::{both, crowded, dispute, forgotten, off, older, refused, rivalry};
@@ -33,7 +33,7 @@ impl Source {
             if fixed && is_in {
                 self.tree.note_fixed(what.1, receipt.from);
             }
-            // Those that never change are said again by whoever starts anew.
+            // Publishers of fixed links are not compared: one that restarts sends its links again.
             let rivals = !fixed && is_in && self.tree.hear(what.1, receipt.from, receipt.now_ns);
             let odd = mixed.filter(|_| is_in).or(odd);
             let odd = if rivals {

@@ -1,4 +1,4 @@
-//! Which bodies a source of common topics has: those of the scene, and what edits make of them while the node runs.
+//! The bodies of a source of common topics: those of the scene, plus additions and removals by edits at run time.
 
 use super::super::order::Order;
 use super::super::shelf::Seat;
@@ -25,7 +25,7 @@ impl Member {
 }
 
 impl Source {
-    /// Takes a body, in the place of one that has left or behind the others; returns its place.
+    /// Adds a body, in the slot of a removed one or at the end; returns its index.
     pub(in super::super) fn put_body(&mut self, body: &BodyNote) -> usize {
         let member = Member::of(body, &mut self.tree);
         let mut members = self.members.iter();
@@ -38,7 +38,7 @@ impl Source {
         place
     }
 
-    /// Takes a body that was put again, where it is heard as before: what was heard of it stays; its place.
+    /// Keeps the state of a body that was put again with the same frame and topic, and returns its index.
     pub(in super::super) fn keep_body(&mut self, body: &BodyNote) -> Option<usize> {
         let frame = self.tree.pin(&body.frame);
         self.tree.unpin(frame);
@@ -48,12 +48,12 @@ impl Source {
             return None;
         }
         member.seat = Seat::of(body);
-        // What it is made of may be new, and then nobody knows where that is: its chain says so again.
+        // Its shape may be new, and the daemon then has no pose of it: the chain is reported again.
         member.last = None;
         Some(place)
     }
 
-    /// A body hangs on another one now, or does no more; its place and seat, if that is news.
+    /// Sets whether a body is attached to another one; returns its index and seat if that is a change.
     pub(in super::super) fn hang_body(
         &mut self,
         name: &str,
@@ -66,13 +66,13 @@ impl Source {
         }
         member.seat.attached = attached;
         if !attached && matches!(member.last, Some(Err(_))) {
-            // That was not handed on while it hung.
+            // The refusal was not handed on while the body was attached.
             member.last = None;
         }
         Some((place, member.seat))
     }
 
-    /// Lets a body go; the place it had, if it had one.
+    /// Removes a body; returns the index that it had, if any.
     pub(in super::super) fn remove_body(&mut self, name: &str) -> Option<usize> {
         let place = self.place_of(name)?;
         let member = self.members.get_mut(place)?;
@@ -83,15 +83,15 @@ impl Source {
         Some(place)
     }
 
-    /// Place and name of each of its bodies.
+    /// Index and name of each of its bodies.
     pub(in super::super) fn bodies(&self) -> impl Iterator<Item = (usize, &str)> {
         let members = self.members.iter().enumerate();
         let seated = members.filter(|(_, member)| member.seat != NOBODY);
         seated.map(|(place, member)| (place, member.name.as_str()))
     }
 
-    /// Whether a message has a link that has come already since the last look, of a source with bodies whose poses are
-    /// each a part of a way: then what they are at is to be looked at before.
+    /// Whether a message has a link that has already changed since the last look, and the source has a continuous body:
+    /// then the poses must be looked up before the message is taken, because each pose is part of a path.
     pub(in super::super) fn is_overtaken(&self, message: &TfMessage) -> bool {
         let mut links = message.transforms.iter();
         self.members.iter().any(|member| member.seat.continuous)

@@ -1,26 +1,26 @@
-//! Stamps and senders that cannot be right, in words: out of order, far from the node's own time, two for one frame.
+//! Fault texts for implausible stamps and senders: out of order, far from the node's time, two senders of a frame.
 //!
-//! Stamps are carried and never trusted for ages (law 4.8), so none of this changes a pose; whoever sends them is told.
+//! Stamps never count for ages (laws 3.8, 4.8). A stamp far from the node's time changes no pose, it is only reported.
 
 use std::collections::VecDeque;
 
 use super::super::told::{brief, gist};
 use super::{Member, Receipt, Source, seconds};
 
-/// How long something that passes is told of, nanoseconds: as long as it takes a person to look.
+/// How long a passing fault is reported, nanoseconds: long enough for a person to see it.
 const TOLD_NS: u64 = 3_000_000_000;
-/// Clocks and paths of one robot differ by less, nanoseconds.
+/// Tolerated distance of a stamp from the node's time, nanoseconds: more than clocks and latencies of one robot differ.
 const OFF_NS: u64 = 1_000_000_000;
 
-/// Most that is told of at once; beyond it the oldest goes.
+/// Most passing faults reported at once; beyond it the oldest is dropped.
 const PASSING_MAX: usize = 8;
 
-/// What was wrong a moment ago: its gist, its words, and when, nanoseconds of `CLOCK_BOOTTIME`. Each gist once.
+/// Recent faults: gist, text, and time, nanoseconds of `CLOCK_BOOTTIME`. Each gist occurs once.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Passing(VecDeque<(String, String, u64)>);
 
 impl Passing {
-    /// Takes what is wrong now.
+    /// Adds a fault of now.
     pub(super) fn put(&mut self, text: String, now_ns: u64) {
         let gist = gist(&text);
         self.0.retain(|(other, ..)| *other != gist);
@@ -30,7 +30,7 @@ impl Passing {
         self.0.push_back((gist, text, now_ns));
     }
 
-    /// What is told of now.
+    /// The faults that are still reported.
     pub(super) fn now(&self, now_ns: u64) -> impl Iterator<Item = String> {
         let all = self.0.iter();
         let fresh = all.filter(move |(.., at)| now_ns.saturating_sub(*at) < TOLD_NS);
@@ -39,14 +39,14 @@ impl Passing {
 }
 
 impl Source {
-    /// Takes what is wrong with a stamp or a link, if anything is.
+    /// Adds a fault of a stamp or a link, if there is one.
     pub(super) fn tell(&mut self, text: Option<String>, receipt: Receipt) {
         if let Some(text) = text {
             self.passing.put(text, receipt.now_ns);
         }
     }
 
-    /// What is wrong with a body of which nothing comes any more.
+    /// The fault of a body whose newest pose is older than the time-out.
     pub(super) fn silence(&self, member: &Member, now_ns: u64) -> Option<String> {
         let silent_ns = now_ns.saturating_sub(member.since_ns?);
         (silent_ns > self.timeout_ns).then(|| {
@@ -58,7 +58,7 @@ impl Source {
     }
 }
 
-/// The link of a frame comes as one that never changes and as one that does.
+/// Text: the link of a frame comes both as a fixed one and as one that changes.
 pub(super) fn both((kind, name): (&str, &str)) -> String {
     format!(
         "{kind} {}: its link comes on the topic of fixed links and on that of others, and the last one counts: leave one out",
@@ -66,13 +66,13 @@ pub(super) fn both((kind, name): (&str, &str)) -> String {
     )
 }
 
-/// A link is of no two frames.
+/// Text: a link does not join two valid frames.
 pub(super) fn refused((kind, name): (&str, &str), why: &str) -> String {
     let name = brief(name);
     format!("{kind} `{name}`: its link is refused, because {why}")
 }
 
-/// There is no room for a frame.
+/// Text: the tree has no room for a frame.
 pub(super) fn crowded((kind, name): (&str, &str)) -> String {
     format!(
         "{kind} {}: its link is refused, because the links on its topic name too many frames: give this source a topic of its own",
@@ -80,20 +80,20 @@ pub(super) fn crowded((kind, name): (&str, &str)) -> String {
     )
 }
 
-/// Links that never change had to go.
+/// Text: fixed links were dropped for lack of room.
 pub(super) fn forgotten(count: u64) -> String {
     format!(
         "{count} links that never change are forgotten, because they are too many: give this source a topic of its own"
     )
 }
 
-/// Two publishers send links of one frame.
+/// Text: two publishers send links of one frame.
 pub(super) fn rivalry((kind, name): (&str, &str)) -> String {
     let name = brief(name);
     format!("{kind} {name}: two publishers send links of it: stop one of them")
 }
 
-/// Another publisher says another link of a frame that never changes: each is said once, so both may be there.
+/// Text: another publisher sends a different fixed link. Each is sent only once, so the first sender may still exist.
 pub(super) fn dispute((kind, name): (&str, &str)) -> String {
     let name = brief(name);
     format!(
@@ -101,7 +101,7 @@ pub(super) fn dispute((kind, name): (&str, &str)) -> String {
     )
 }
 
-/// A stamp lies before the newest one of the same body or link: the message is passed over.
+/// Text: a stamp is before the newest one of the same body or link, and the message is skipped.
 pub(super) fn older((kind, name): (&str, &str), by_ns: u64) -> String {
     format!(
         "{kind} {}: a stamp lies {:.3} s before the one that was there: it is passed over; does the network bring it late, or do two senders write it?",
@@ -110,7 +110,7 @@ pub(super) fn older((kind, name): (&str, &str), by_ns: u64) -> String {
     )
 }
 
-/// What is wrong with a stamp that is not near the node's time; a stamp of 0 says nothing.
+/// Text: a stamp is far from the node's time; `None` if it is near, or if either is 0 (not set).
 pub(in super::super) fn off(
     (kind, name): (&str, &str),
     stamp_ns: u64,
@@ -167,7 +167,7 @@ mod tests {
         ] {
             assert_eq!(said(stamp_ns, now_ns), None);
         }
-        // A source that may be silent for long may be late by as much.
+        // A source with a long time-out may have stamps as late as that.
         assert_eq!(off(("body", "b"), 97 * S, receipt(100 * S), 5 * S), None);
     }
 }

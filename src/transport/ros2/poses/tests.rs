@@ -1,4 +1,4 @@
-//! What becomes of good and bad messages of common types.
+//! Updates and faults for good and bad messages of common types.
 
 #![allow(clippy::float_cmp, reason = "poses are handed on bit by bit")]
 
@@ -199,7 +199,7 @@ fn time_that_goes_back_is_told_once_and_small_disorder_is_passed_over() {
     };
     assert_eq!(send(2000 * MS, MS, &mut updates), (false, 0));
     assert_eq!(send(1900 * MS, MS, &mut updates), (false, 1));
-    // A clock that began anew; its first messages may as well be late ones of the old.
+    // A restarted clock; its first messages might also be late ones of the old clock.
     assert_eq!(send(10 * MS, MS, &mut updates), (false, 2));
     assert_eq!(send(20 * MS, 150 * MS, &mut updates), (false, 3));
     assert_eq!(updates.len(), 1);
@@ -274,7 +274,7 @@ fn law_3_8_a_chain_is_as_old_as_its_oldest_link() {
     let said = look(&mut one, 400 * MS);
     assert!(said[0].result.is_ok());
     assert_eq!((said[0].since_ns, said[0].received_ns), (MS, 400 * MS));
-    // Beyond the time-out there is no pose, and that is said at once.
+    // A chain older than the time-out has no pose, which is reported at once.
     one.take_links(&link("base", "tool", 0), false, at(900 * MS));
     let said = look(&mut one, 900 * MS);
     assert!(said[0].result.is_err());
@@ -306,7 +306,7 @@ fn a_frame_that_two_publishers_link_is_told_and_bug_so_was_a_sender_that_starts_
     assert!(told(&one, 500 * MS));
     one.take_links(&link("world", "tool", 5000 * MS), false, from(2, 5000 * MS));
     assert!(!told(&one, 5000 * MS), "the other has stopped");
-    // Five by turns.
+    // Five publishers in turn.
     for (number, now_ns) in [(1, 5010), (3, 5020), (4, 5030), (5, 5040), (2, 5050)] {
         let receipt = from(number, now_ns * MS);
         one.take_links(&link("world", "tool", receipt.now_ns), false, receipt);
@@ -341,7 +341,7 @@ fn bug_of_several_frames_that_are_wrong_at_once_one_alone_was_told() {
     for frame in ["late", "early", "self"] {
         assert!(told.iter().any(|text| text.contains(frame)), "{told:?}");
     }
-    // No more than a few, and no longer than it holds.
+    // At most 8 faults, and none after their reporting time.
     for frame in 0..50 {
         let frame = format!("frame{frame}");
         one.take_links(&link(&frame, &frame, now_ns), false, now(now_ns));
@@ -364,7 +364,7 @@ fn bug_a_body_of_which_nothing_comes_any_more_was_named_nowhere() {
     one.take_links(&link("world", "tool", 600 * MS), false, at(600 * MS));
     look(&mut one, 600 * MS);
     assert!(!silent(&one, 700 * MS));
-    // Links that never change are said once.
+    // Fixed links are sent only once.
     let mut one = tf("tool");
     one.take_links(&link("world", "tool", MS), true, at(MS));
     look(&mut one, MS);

@@ -1,11 +1,11 @@
-//! From requests of services to edits in the words of scene files and of shared memory. Pure.
+//! Converts service requests to edits in the JSON of scene files and shared memory. Pure.
 
 use serde_json::{Value, json};
 
 use super::super::told::brief;
 use crate::wire::ros::{AttachBody, Pose, PutBody, SetFilter, SolidPrimitive};
 
-/// An edit for the log: its verb, and the body it names.
+/// Describes an edit for the log: its verb and its body.
 pub(super) fn in_words(edit: &Value) -> String {
     let entry = edit.as_object().and_then(|edit| edit.iter().next());
     let verb = entry.map_or("", |(verb, _)| verb.as_str());
@@ -22,7 +22,7 @@ fn place(pose: &Pose) -> (Value, Value) {
     (json!([p.x, p.y, p.z]), json!([q.x, q.y, q.z, q.w]))
 }
 
-/// A body in the words of a scene file.
+/// The edit that puts a body, with the keys of a scene file.
 pub(super) fn put(request: &PutBody) -> Result<Value, String> {
     let mut body = match request.options_json.trim() {
         "" => serde_json::Map::new(),
@@ -87,7 +87,7 @@ fn placed(mut shape: Value, pose: &Pose) -> Value {
     shape
 }
 
-/// Dimensions in the order that `shape_msgs/SolidPrimitive` says.
+/// Reads the dimensions in the order of `shape_msgs/SolidPrimitive`.
 fn primitive_of(primitive: &SolidPrimitive) -> Result<Value, String> {
     match (primitive.kind, primitive.dimensions.as_slice()) {
         (1, [x, y, z]) => Ok(json!({ "type": "box", "half_extents": [x / 2.0, y / 2.0, z / 2.0] })),
@@ -106,7 +106,7 @@ fn primitive_of(primitive: &SolidPrimitive) -> Result<Value, String> {
     }
 }
 
-/// A body hung on another, or let go.
+/// The edit that attaches a body to another one, or detaches it.
 pub(super) fn attach(request: &AttachBody) -> Value {
     let (position, orientation) = place(&request.pose);
     match (request.to.as_str(), request.keep_pose) {
@@ -117,7 +117,7 @@ pub(super) fn attach(request: &AttachBody) -> Value {
     }
 }
 
-/// Masks or a pair rule.
+/// The edit that sets masks or a pair rule, or drops rules.
 pub(super) fn filter(request: &SetFilter) -> Result<Value, String> {
     let (a, b) = (&request.a, &request.b);
     let rule = |action: &str| json!({ "rule": { "action": action, "a": a, "b": b, "reason": request.reason } });

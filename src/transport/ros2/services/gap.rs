@@ -1,9 +1,9 @@
-//! From the answer of a question for a gap to the response of `~/gap`. Pure.
+//! Converts the answer of a gap question to the response of `~/gap`. Pure.
 
 use crate::wire::Answer;
 use crate::wire::ros::{GapTold, tick_header};
 
-/// The response; what is not known is no number.
+/// The response. Unknown values are NaN, and unknown bounds infinite.
 pub(super) fn told(answer: Answer) -> GapTold {
     let none = [f64::NAN; 3];
     let Some(gap) = answer.gap else {

@@ -1,8 +1,8 @@
-//! The thread that puts requests in words (`ros-words`): a mesh of a million triangles takes it some hundred
-//! milliseconds, for which no pose may wait.
+//! The thread that converts requests to JSON (`ros-words`): a mesh of a million triangles takes some hundred
+//! milliseconds, which must not delay poses.
 //!
-//! In: requests that may be done, in the order of their receipt. Out: in the same order, JSON for the tick thread, or
-//! why there is none for the receiving thread, which is woken.
+//! In: accepted requests, in the order of receipt. Out, in the same order: JSON for the tick thread, or an error for
+//! the receiving thread, which is woken.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -20,13 +20,13 @@ use super::{Desk, Verb};
 use crate::error::{Error, Result};
 use crate::wire::Answer;
 
-/// Puts a request in the words of scene files, or says why it cannot.
+/// Converts a request to the JSON of scene files, or returns why it cannot.
 pub(super) type Words = Box<dyn FnOnce() -> std::result::Result<Value, String> + Send>;
 
-/// A request: its token, what it asks for.
+/// A request: its token, its kind and its conversion.
 type Asked = (u64, Verb, Words);
 
-/// The way to the thread, which ends with it.
+/// Handle of the thread, which ends with the handle.
 pub(super) struct Scribe {
     to: Option<Sender<Asked>>,
     thread: Option<JoinHandle<()>>,
@@ -51,7 +51,7 @@ impl Scribe {
         })
     }
 
-    /// Hands a request over; whether the thread is there to take it.
+    /// Hands over a request; returns whether the thread still runs.
     pub(super) fn take(&self, asked: Asked) -> bool {
         self.to.as_ref().is_some_and(|to| to.send(asked).is_ok())
     }
@@ -59,7 +59,7 @@ impl Scribe {
 
 impl Drop for Scribe {
     fn drop(&mut self) {
-        // First, since it ends the thread.
+        // The channel closes first, which ends the thread.
         self.to = None;
         let _told_by_its_panic = self.thread.take().map(JoinHandle::join);
     }
@@ -71,7 +71,7 @@ fn write(from: &Receiver<Asked>, shared: &Shared, waker: &Waker) {
             return;
         }
         let desk: &Desk = &shared.desk;
-        // One that cannot be put in words leaves the others theirs.
+        // A panic in one conversion must not end the others.
         let words = catch_unwind(AssertUnwindSafe(words));
         match words.unwrap_or_else(|_| Err("it cannot be read: its log says why".to_owned())) {
             Ok(what) => {

@@ -1,9 +1,9 @@
-//! What waits, what gives way, and what is told of it.
+//! Which frames and poses wait, which are dropped, and how drops are reported.
 
 use super::*;
 use crate::wire::name_bytes;
 
-/// Of bodies with these ids.
+/// Seats of bodies with these ids.
 fn seats(ids: &[u64]) -> Vec<Seat> {
     let seat = |&body| Seat {
         body,
@@ -111,7 +111,7 @@ fn time_that_goes_back_raises_the_epoch_and_drops_what_waits() {
     );
 }
 
-/// They fell into several frames by age, and those of continuous bodies were not in step.
+/// Before the fix, such bodies were split into several frames by age, and continuous bodies were not in step.
 #[test]
 fn bug_bodies_that_moved_together_on_chains_of_different_age_stay_together() {
     let shelf = Shelf::default();
@@ -171,7 +171,7 @@ fn bug_poses_of_a_continuous_body_that_gave_way_to_newer_ones_were_not_missing()
         4
     );
     assert_eq!(number(&[update(1, 4.0, 9)]), 5, "none gave way");
-    // Of a body that is where its newest pose says nothing is missing; nor is what was said twice, or refused.
+    // Replaced poses count as missing only for continuous bodies, and not if they were repeated or refused.
     assert_eq!(number(&[update(0, 2.0, 6), update(0, 3.0, 7)]), 6);
     assert_eq!(number(&[update(1, 5.0, 10), update(1, 5.0, 10)]), 7);
     let refused = Update {
@@ -181,7 +181,7 @@ fn bug_poses_of_a_continuous_body_that_gave_way_to_newer_ones_were_not_missing()
     assert_eq!(number(&[refused, update(1, 6.0, 12)]), 8);
 }
 
-/// What it sent was `session_over` for as long as the daemon ran.
+/// Before the fix, the source's frames were refused as `session_over` for as long as the daemon ran.
 #[test]
 fn bug_a_stranger_under_the_name_of_a_source_of_topics_locked_that_source_out() {
     let shelf = Shelf::default();
@@ -201,7 +201,7 @@ fn bug_a_stranger_under_the_name_of_a_source_of_topics_locked_that_source_out() 
         tick.sources_len = 2;
         tick
     };
-    // Who spoke in a tick; the session of what is sent after it.
+    // The session in force in a tick; the session of the frames sent after it.
     let sent = |session| {
         shelf.hear(&tick(session), draw);
         for group in 0..2 {
@@ -213,10 +213,10 @@ fn bug_a_stranger_under_the_name_of_a_source_of_topics_locked_that_source_out() 
         inbox.frames()[0].header.session
     };
     assert_eq!([0, 9, 9].map(sent), [9; 3]);
-    // It speaks, and is silent; the new one is not in force yet, and is kept until it is.
+    // A stranger sends, then falls silent; the new session is kept, though it is not in force yet.
     assert_eq!([5, 5, 5, 0, 0].map(sent), [101; 5]);
     assert_eq!([101, 101].map(sent), [101; 2]);
-    // One came and went between two ticks.
+    // A stranger came and went between two ticks.
     assert_eq!([0, 0, 102].map(sent), [102; 3]);
     assert_eq!([6, 7].map(sent), [103, 104], "each may have ended it");
     let fails = || Err(crate::error::Error::Usage(String::new()));

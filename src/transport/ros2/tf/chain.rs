@@ -1,47 +1,47 @@
-//! Chains of links: the pose of a frame in the scene's frame, as tf2 finds it. Pure.
+//! Chains of links: the pose of a frame in the scene's frame, found as in tf2. Pure.
 //!
-//! Where the frame hangs on the scene's frame, its chain is all there is to it. Else the scene's frame may hang on
-//! something, too (`map` above `odom`, and bodies below `map`): two chains that meet, the second one turned round.
+//! If the scene's frame is an ancestor of the frame, the pose is one chain. Otherwise, both may have a common ancestor
+//! (`map` above `odom`, and bodies below `map`): then it is two chains that meet there, the second one inverted.
 
 use super::{Tree, sound};
 use crate::math::Pose;
 use crate::wire::RejectReason;
 
-/// Links of one chain; a longer one is as good as a loop.
+/// Most links of a chain; a longer one counts as a loop.
 const CHAIN_MAX: usize = 256;
 
-/// Where a frame is.
+/// The pose of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in super::super) struct Found {
     /// Position in the scene's frame, metres.
     pub(in super::super) position: [f64; 3],
     /// Orientation x, y, z, w.
     pub(in super::super) orientation: [f64; 4],
-    /// Oldest stamp of the chain's links that have an age; 0: none has one.
+    /// Oldest stamp of the chain's links that are not fixed; 0: none has one.
     pub(in super::super) stamp_ns: u64,
-    /// How far the stamps lie apart, nanoseconds.
+    /// Difference between its oldest and newest stamp, nanoseconds.
     pub(in super::super) skew_ns: u64,
-    /// Latest and earliest receipt of links that have an age, nanoseconds of `CLOCK_BOOTTIME`; `None`: none has.
+    /// Latest and earliest receipt of links that are not fixed, nanoseconds of `CLOCK_BOOTTIME`; `None`: all are fixed.
     pub(in super::super) received_ns: Option<(u64, u64)>,
 }
 
 /// Why a frame has no pose.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in super::super) enum Missing {
-    /// The chain ends at this frame, which nobody has linked yet.
+    /// The chain ends at this frame, which has no link to a parent yet.
     Frame(String),
-    /// As [`Self::Frame`], and that of the scene's frame ends at the second one.
+    /// As [`Self::Frame`], and the chain of the scene's frame ends at the second frame.
     Apart(String, String),
-    /// The chain comes back to this frame.
+    /// The chain contains a loop through this frame, or is longer than `CHAIN_MAX`.
     Loop(String),
-    /// The link of this frame has numbers that are no pose.
+    /// The link of this frame is not a pose.
     Bad(String, RejectReason),
 }
 
-/// Stamps and receipts of links that have an age.
+/// Stamps and receipts of the links that are not fixed.
 #[derive(Clone, Copy, Debug)]
 struct Ages {
-    /// Of stamps that are there, nanoseconds.
+    /// Of stamps other than 0, nanoseconds.
     oldest_ns: u64,
     newest_ns: u64,
     /// Of receipts, nanoseconds of `CLOCK_BOOTTIME`.
@@ -58,7 +58,7 @@ impl Ages {
     };
 
     fn take(&mut self, stamp_ns: u64, received_ns: u64) {
-        // A stamp of 0 says nothing: its sender has no clock.
+        // A stamp of 0 means that the sender has no clock.
         if stamp_ns != 0 {
             self.oldest_ns = self.oldest_ns.min(stamp_ns);
             self.newest_ns = self.newest_ns.max(stamp_ns);
@@ -80,19 +80,19 @@ impl Ages {
     }
 }
 
-/// A way up.
+/// The part of a chain from a frame up to an ancestor.
 #[derive(Debug, Default)]
 struct Climb {
-    /// The pose of its foot in its top; `None`: it has no link.
+    /// Pose of the frame in the ancestor; `None`: they are the same.
     pose: Option<Pose>,
-    /// The numbers of its only link as they came.
+    /// The unchanged numbers of the link, if there is only one.
     single: Option<([f64; 3], [f64; 4])>,
 }
 
 impl Tree {
-    /// Where `frame` is in `root`.
+    /// The pose of `frame` in `root`.
     ///
-    /// A single link is handed on as it came, so that its pose is bit by bit what the sender wrote.
+    /// The numbers of a single link are passed on unchanged, so that the pose is bit by bit that of the sender.
     pub(in super::super) fn find(&self, frame: usize, root: usize) -> Result<Found, Missing> {
         let mut ages = Ages::NONE;
         let first = match self.climb((frame, root), &mut ages) {
@@ -100,7 +100,7 @@ impl Tree {
                 let (position, orientation) = single.unwrap_or_else(|| numbers(pose));
                 return Ok(ages.found(position, orientation));
             }
-            // A bad link may lie above where both ways meet.
+            // The bad link may be above the common ancestor, and then does not matter.
             Err(first @ (Missing::Frame(_) | Missing::Bad(..))) => first,
             Err(other) => return Err(other),
         };
@@ -116,7 +116,7 @@ impl Tree {
         Ok(ages.found(position, orientation))
     }
 
-    /// The way from a frame up to another one.
+    /// Composes the links from a frame up to an ancestor.
     fn climb(&self, (from, to): (usize, usize), ages: &mut Ages) -> Result<Climb, Missing> {
         let (mut at, mut way) = (from, Climb::default());
         for length in 0.. {
@@ -144,10 +144,10 @@ impl Tree {
         Ok(way)
     }
 
-    /// The first frame above `root` that is also above `frame`, or one of these two.
+    /// The lowest frame that is `root` or above it, and also `frame` or above it.
     ///
     /// # Errors
-    /// Where there is none: the last frame above `root`.
+    /// If there is none: the last frame above `root`.
     fn joint(&self, frame: usize, root: usize) -> Result<usize, usize> {
         let above: Vec<usize> = self.above(frame).collect();
         let mut last = root;
@@ -160,20 +160,20 @@ impl Tree {
         Err(last)
     }
 
-    /// A frame and those above it, as many as a chain has.
+    /// A frame and its ancestors, at most as many as a chain has.
     fn above(&self, frame: usize) -> impl Iterator<Item = usize> + '_ {
         let next = |&at: &usize| self.link(at).map(|link| link.parent);
         std::iter::successors(Some(frame), next).take(CHAIN_MAX + 1)
     }
 
-    /// Whether a body's pose is made of the link of a frame, or will be once its chain is there.
+    /// Whether the pose of a body depends on the link of a frame, or will once its chain is complete.
     ///
-    /// Cost: the chains of all bodies; a clock that begins anew is rare.
+    /// Cost: O(lengths of the chains of all bodies); clocks restart rarely.
     pub(super) fn is_needed(&self, child: usize) -> bool {
         let is_root = |at: usize| Some(at) == self.root;
         let mut above_root = self.root.into_iter().flat_map(|root| self.above(root));
         let is_above_root = above_root.any(|at| at == child);
-        // The scene has its frame, too.
+        // The scene itself pins the root once.
         let pinned = self.frames.iter().enumerate();
         let mut bodies = pinned.filter(|(at, frame)| frame.pins > usize::from(is_root(*at)));
         bodies.any(|(body, _)| {
@@ -189,7 +189,7 @@ impl Tree {
     }
 }
 
-/// Position, and orientation x, y, z, w.
+/// Position, metres, and orientation x, y, z, w.
 fn numbers(pose: Option<Pose>) -> ([f64; 3], [f64; 4]) {
     let pose = pose.unwrap_or_else(Pose::identity);
     let turned = pose.rotation.coords;

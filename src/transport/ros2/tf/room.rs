@@ -1,20 +1,20 @@
-//! Room in the tree of `/tf`: a tracker may name a frame a detection, for ever.
+//! Limits the size of the tree of `/tf`: a tracker may name a new frame for each detection, without end.
 //!
-//! In: links of ever new frames. Out: frames that are needed stay, the others go when there are too many. Pure.
+//! In: links of ever new frames. Out: frames that bodies need stay, others are dropped when there are too many. Pure.
 
 use super::Tree;
 
-/// Frames of one tree beside those of bodies: a robot has some hundred; beyond it somebody invents names, and memory
-/// would grow.
+/// Frames of one tree, without those of bodies: a robot has some hundred. Without a limit, a sender of invented names
+/// would fill the memory.
 pub(super) const FRAMES_MAX: usize = 1 << 16;
-/// Longest name of a frame, bytes: as long as a body's `ros_frame` may be. Frames are bounded by how many there are,
-/// and names without an end would take all memory.
+/// Longest name of a frame, bytes, the same as of a body's `ros_frame`. The number of frames has a limit, but names of
+/// any length would fill the memory.
 pub(super) const FRAME_NAME_BYTES_MAX: usize = 255;
-/// Links refused between two looks for room, which visit every frame: who floods a full tree costs no more.
+/// Refused links between two attempts to make room. An attempt visits every frame, so a flood must not cause one each.
 const DENIED: usize = FRAMES_MAX / 8;
 
 impl Tree {
-    /// Whether a link between these two can be taken.
+    /// Whether a link between these frames can be taken; makes room if needed.
     pub(super) fn has_room(&mut self, child: &str, parent: &str) -> bool {
         let two = [child, parent];
         let new = two.into_iter().filter(|name| !self.ids.contains_key(*name));
@@ -31,13 +31,13 @@ impl Tree {
         fits
     }
 
-    /// How many links that never change had to go since the last call.
+    /// Takes the number of fixed links dropped since the last call.
     pub(in super::super) fn take_let_go(&mut self) -> u64 {
         std::mem::take(&mut self.let_go)
     }
 
-    /// Lets the frames go that no body's chain leads over. Links that have an age come again when they are needed;
-    /// those that never change are said once, and go only where they are what fills the tree.
+    /// Drops the frames that no body's chain contains. Links that are not fixed arrive again when they are needed.
+    /// Fixed links are sent only once: they are dropped only if they and the needed links fill over half of the tree.
     fn make_room(&mut self) {
         let mut needed = self.needed(true);
         let kept = needed.iter().filter(|needed| **needed).count();
@@ -56,9 +56,9 @@ impl Tree {
         }
     }
 
-    /// Which frames the chains of bodies lead over.
+    /// Which frames the chains of bodies contain.
     ///
-    /// * `fixed` - also the chains of links that never change.
+    /// * `fixed` - also include the chains of fixed links.
     fn needed(&self, fixed: bool) -> Vec<bool> {
         let mut needed = vec![false; self.frames.len()];
         for (id, frame) in self.frames.iter().enumerate() {

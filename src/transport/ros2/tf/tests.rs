@@ -1,4 +1,4 @@
-//! Chains, their faults, and what becomes of frames that nobody needs.
+//! Chains and their faults, and the removal of frames that no body needs.
 
 #![allow(clippy::float_cmp, reason = "numbers are handed on bit by bit")]
 
@@ -35,7 +35,7 @@ fn a_chain_is_composed_and_its_stamps_are_compared() {
     tree.take(&link("base", "tool", 2.0, 130), false, 8, BACK_NS);
     tree.take(&link("tool", "tip", 0.0, 0), true, 9, BACK_NS);
     let found = find(&mut tree, "tip").unwrap();
-    // A quarter turn at the base swings the tool to +y; three of them make the tip look back along -y.
+    // A quarter turn at the base moves the tool to +y; with three quarter turns the tip points along -y.
     let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
     assert!(
         near(found.position[0], 1.0) && near(found.position[1], 2.0),
@@ -108,7 +108,7 @@ fn bug_frames_without_end_leave_room_for_those_of_bodies() {
         );
         assert_eq!(taken, Taken::Newer, "{n}");
     }
-    // What hangs on a body's chain, and what is said once, has stayed or finds room; and no frame is another's.
+    // Links of a body's chain and fixed links have stayed or find room, and no index is used by two frames.
     tree.take(&link("plate", "arm", 1.0, 5), false, 1, BACK_NS);
     tree.take(&link("arm", "tool", 1.0, 5), false, 1, BACK_NS);
     assert!(find(&mut tree, "tool").is_ok());
@@ -176,7 +176,7 @@ fn bug_a_frame_whose_name_is_too_long_is_refused_and_not_kept() {
         let taken = tree.take(&link(parent, child, 1.0, 100), false, 7, BACK_NS);
         assert!(matches!(taken, Taken::Refused(_)) && tree.ids.is_empty());
     }
-    // A slash in front belongs to no name.
+    // A leading slash is not part of a name.
     let taken = tree.take(
         &link("camera", &format!("/{longest}"), 1.0, 100),
         false,
@@ -186,7 +186,7 @@ fn bug_a_frame_whose_name_is_too_long_is_refused_and_not_kept() {
     assert_eq!((taken, tree.ids.len()), (Taken::Newer, 2));
 }
 
-/// A tree whose scene is in `odom`, which hangs on `map`.
+/// A tree with `odom` as the scene's frame, which is a child of `map`.
 fn odom() -> (Tree, usize) {
     let (mut tree, root) = Tree::rooted("odom");
     tree.take(&link("map", "odom", 1.0, 100), false, 7, BACK_NS);
@@ -199,18 +199,18 @@ fn bug_a_body_beside_the_scenes_frame_had_no_pose_though_a_frame_above_both_join
     tree.take(&link("map", "obstacle", 3.0, 140), false, 9, BACK_NS);
     let obstacle = tree.pin("obstacle");
     let found = tree.find(obstacle, root).unwrap();
-    // Two metres ahead in `map` are on the right in `odom`, which is turned by a quarter; both are turned alike.
+    // `odom` is turned by a quarter in `map`, so the obstacle 2 m ahead in `map` is 2 m to the right; the turns cancel.
     let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
     let [x, y, z] = found.position;
     assert!(near(x, 0.0) && near(y, -2.0) && near(z, 0.0), "{found:?}");
     assert!(near(found.orientation[3].abs(), 1.0), "{found:?}");
     assert_eq!((found.stamp_ns, found.skew_ns), (100, 40));
     assert_eq!(found.received_ns, Some((9, 7)));
-    // The frame above is itself a body's.
+    // The ancestor is itself the frame of a body.
     let map = tree.pin("map");
     let [x, y, _] = tree.find(map, root).unwrap().position;
     assert!(near(x, 0.0) && near(y, 1.0), "{x} {y}");
-    // What hangs on the scene's frame needs nothing above it.
+    // A frame below the scene's frame needs nothing above it.
     tree.take(&link("odom", "base", 5.0, 5), false, 3, BACK_NS);
     let base = tree.pin("base");
     let found = tree.find(base, root).unwrap();
@@ -224,7 +224,7 @@ fn chains_that_do_not_meet_are_told_with_both_ends() {
     let tool = tree.pin("tool");
     let apart = Missing::Apart("base".to_owned(), "map".to_owned());
     assert_eq!(tree.find(tool, root), Err(apart));
-    // A loop above the scene's frame joins nothing, and a link that is no pose is no refusal where it is not needed.
+    // A loop above the scene's frame joins no chains, and an invalid link that no chain needs is no refusal.
     tree.take(&link("odom", "map", 1.0, 1), false, 1, BACK_NS);
     assert!(matches!(
         tree.find(tool, root),
@@ -250,7 +250,7 @@ fn bug_a_bad_link_above_the_frame_that_joins_two_chains_refused_bodies_that_do_n
     assert!(tree.find(obstacle, root).is_ok());
 }
 
-/// Three stamps of a clock that began anew; what the last of them makes of it.
+/// Sends three stamps of a restarted clock; returns the result of the last.
 fn restart(tree: &mut Tree, parent: &str, child: &str) -> Taken {
     tree.take(&link(parent, child, 1.0, 2000), false, 1, BACK_NS);
     let late = [0, 150, 300].map(|n| {
@@ -272,7 +272,7 @@ fn bug_a_link_that_no_body_hangs_on_began_the_whole_source_anew() {
         assert_eq!(tree.take(&on, false, 400, BACK_NS), Taken::Newer);
     }
     assert!(tree.find(base, root).is_ok());
-    // Now a body hangs on each of these two, and one beside the scene's frame on what is above that.
+    // Now a body depends on each of these two links: one directly, one because it is joined above the scene's frame.
     tree.pin("tag");
     assert_eq!(restart(&mut tree, "camera", "tag"), Taken::WentBack);
     assert!(tree.find(base, root).is_err());

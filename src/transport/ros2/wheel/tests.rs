@@ -1,4 +1,4 @@
-//! What readers that stop, and readers that come, do to the others: nothing.
+//! Readers that stop, and new readers, do not affect the other readers.
 
 #![allow(
     clippy::disallowed_methods,
@@ -19,17 +19,17 @@ use crate::time::{Clock as _, SystemClock};
 use crate::wire::ros::State;
 
 pub(in super::super) const TOPIC: (&str, TypeName) = ("/wheel", ("sweepd_msgs", "State"));
-/// Says to the reader's process which domain it is to join.
+/// Environment variable with the domain for the reader's process.
 const DOMAIN: &str = "SWEEPD_TEST_WHEEL_DOMAIN";
-/// Between two messages.
+/// Time between two messages.
 pub(in super::super) const STEP: Duration = Duration::from_millis(40);
-/// A window of 16 messages: with 40 ms between them a stopped reader fills it in 0.6 s.
+/// A window of 16 messages: with 40 ms between messages a stopped reader fills it in 0.6 s.
 pub(in super::super) const SMALL: Out = Out {
     bytes: 1 << 20,
     ..Out::RELIABLE
 };
 
-/// A domain that no other process of these tests is in, nor another of `place`.
+/// The domain of this process for `place`; another process has the same one only if its id is equal modulo 16.
 pub(in super::super) fn domain(place: u16) -> u16 {
     101 + u16::try_from(std::process::id() % 16).unwrap() * 8 + place
 }
@@ -62,7 +62,7 @@ pub(in super::super) fn reader(
     subscription(node, context, TOPIC, quality).unwrap()
 }
 
-/// Numbers of the messages that have come.
+/// Appends the numbers of the received messages.
 pub(in super::super) fn hear(from: &Subscription<State>, heard: &mut Vec<u64>) {
     while let Ok(Some((message, _))) = from.take() {
         heard.push(message.worst_a);
@@ -76,7 +76,7 @@ pub(in super::super) fn message(number: u64) -> State {
     }
 }
 
-/// The process that is stopped: no test unless another one starts it.
+/// The body of the process that is stopped; does nothing as a test of its own.
 #[test]
 fn a_reader_in_a_process_of_its_own() {
     let Some(domain) = std::env::var(DOMAIN).ok().and_then(|d| d.parse().ok()) else {
@@ -94,13 +94,13 @@ fn a_reader_in_a_process_of_its_own() {
 pub(in super::super) struct Killed(Child);
 
 impl Killed {
-    /// It acknowledges nothing from now on.
+    /// Stops the process, which acknowledges nothing from then on.
     pub(in super::super) fn stop(&self) {
         kill_process(Pid::from_child(&self.0), Signal::STOP).unwrap();
     }
 }
 
-/// A reader in a process of its own, to be stopped.
+/// Starts a reader in a process of its own, to be stopped.
 pub(in super::super) fn stopped(domain: u16) -> Killed {
     let child = Command::new(std::env::current_exe().unwrap())
         .args([
@@ -121,7 +121,7 @@ impl Drop for Killed {
     }
 }
 
-/// A wheel, and a reader in another participant of this process.
+/// A wheel, and a healthy reader in another participant of this process.
 struct Rig {
     node: Node,
     context: Context,
@@ -165,7 +165,7 @@ impl Rig {
         }
     }
 
-    /// One message more.
+    /// Publishes one message, and reads those that arrived.
     fn step(&mut self) {
         self.next += 1;
         let now_ns = SystemClock.boottime_ns();
@@ -184,7 +184,7 @@ impl Rig {
         hear(&self.from, &mut self.heard);
     }
 
-    /// Goes on until all that was sent before is heard, or is not.
+    /// Continues until a message of now or later is received, so that earlier ones are received or lost.
     fn settle(&mut self) {
         let last = self.next;
         let end = Instant::now() + Duration::from_secs(10);
@@ -225,7 +225,7 @@ fn a_reader_that_stops_turns_the_writer_and_the_others_go_on() {
     assert_eq!(rig.sent.given_up, (rig.turns - 1) * window);
     assert!(rig.heard.is_sorted(), "in their order");
     assert_eq!(rig.missing(), [0; 0], "of {}", rig.next);
-    // One of another kind takes the place of them all, whose readers are forgotten with them.
+    // A writer of another reliability replaces all writers, and their readers are forgotten.
     let beside = rig.wheel.before.iter().chain(&rig.wheel.next);
     let all: Vec<_> = beside
         .chain([&rig.wheel.current])
@@ -248,7 +248,7 @@ fn bug_a_reader_that_comes_to_a_busy_topic_costs_the_others_nothing() {
     let domain = domain(1);
     let mut rig = Rig::of(domain);
     rig.await_readers(1);
-    // More than the window has been sent before the others come.
+    // The writer has sent more than its window before the others join.
     for _ in 0..3 * SMALL.window() {
         rig.step();
     }

@@ -1,4 +1,4 @@
-//! Chains that begin beside the scene's frame, and what says nothing of a body.
+//! Chains that do not start below the scene's frame, and links that do not concern a body.
 
 use super::*;
 
@@ -31,7 +31,7 @@ fn bug_a_camera_that_was_started_again_began_bodies_anew_that_hang_on_none() {
         assert!(!one.take_links(&tag, false, at(now_ms * MS)));
         assert!(look(&mut one, now_ms * MS).is_empty());
     }
-    // Of the body's own link it is news.
+    // A restarted clock of the body's own link restarts the source.
     for (now_ms, back) in [(410, false), (600, false), (800, true)] {
         let tool = link("world", "tool", now_ms * MS);
         assert_eq!(one.take_links(&tool, false, at(now_ms * MS)), back);

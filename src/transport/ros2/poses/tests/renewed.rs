@@ -1,8 +1,8 @@
-//! What is said again although nothing is new.
+//! Updates that are repeated without a change.
 
 use super::*;
 
-/// A chain that is a loop, or whose link is no pose.
+/// A source whose body has a chain with a loop, or a link with a zero quaternion.
 fn broken(zero: bool) -> Source {
     let mut one = tf("a");
     let mut message = link("world", "a", 2 * MS);
