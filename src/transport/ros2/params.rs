@@ -20,6 +20,7 @@ use specs::{Spec, When, all};
 use super::RosScene;
 use super::open;
 use super::params_file::{Setting as Said, Value};
+use super::told::brief;
 use crate::config::Mode;
 use crate::transport::Setting;
 
@@ -182,7 +183,7 @@ impl Table {
     /// Why not, and what to do.
     fn check(&self, name: &str, value: &Value) -> Result<Value, String> {
         let Some(spec) = self.specs.iter().find(|spec| spec.name == name) else {
-            let names = self.names().join(", ");
+            let (name, names) = (brief(name), self.names().join(", "));
             return Err(format!(
                 "this node has no parameter `{name}`; it has {names}"
             ));

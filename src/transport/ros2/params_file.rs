@@ -1,8 +1,12 @@
 //! Parameter files: YAML of `NODE: ros__parameters: NAME: VALUE`. In: text. Out: settings in the order of the file,
 //! each with the pattern of the nodes that it applies to.
 
+mod pattern;
+
 use yaml_rust2::parser::Parser;
 use yaml_rust2::{Event, Yaml, YamlLoader};
+
+use pattern::matches;
 
 use super::told::brief;
 
@@ -251,20 +255,6 @@ impl Setting {
         let pattern: Vec<&str> = pattern.split('/').collect();
         let name: Vec<&str> = full_name.trim_start_matches('/').split('/').collect();
         matches(&pattern, &name)
-    }
-}
-
-/// Whether a pattern matches a name: `*` matches one part of the name, `**` any number of parts.
-fn matches(pattern: &[&str], name: &[&str]) -> bool {
-    match (pattern, name) {
-        ([], []) => true,
-        (["**", rest @ ..], _) => {
-            (0..=name.len()).any(|at| name.get(at..).is_some_and(|name| matches(rest, name)))
-        }
-        ([one, rest @ ..], [own, others @ ..]) => {
-            (*one == "*" || one == own) && matches(rest, others)
-        }
-        _ => false,
     }
 }
 

@@ -27,6 +27,7 @@ use super::reply;
 use super::shared::{Say, Shared};
 use super::topics::{In, TypeName, failed, patiently};
 use crate::error::{Error, Result};
+use crate::time::{Clock as _, SystemClock};
 use crate::wire::ros::{
     AttachBody, Edited, EnableBody, Gap, GapTold, PutBody, RemoveBody, Reset, SetFilter, TickNow,
     Ticked,
@@ -268,7 +269,8 @@ impl Services {
 
     fn send(&self, verb: Verb, id: RmwRequestId, answer: Answer, shared: &Shared) {
         if let (Some(why), true) = (&answer.error, verb != Verb::Gap) {
-            shared.say(Say::Warn, &format!("an edit over ROS 2 was refused: {why}"));
+            let text = format!("an edit over ROS 2 was refused: {why}");
+            shared.say_seldom(Say::Warn, &text, SystemClock.boottime_ns());
         }
         match verb {
             Verb::Gap => reply::send((&self.gap, "~/gap"), id, told(answer), shared),

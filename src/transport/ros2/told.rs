@@ -3,6 +3,7 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 
 /// A text that has not applied for this long is new again, nanoseconds; longer than passing faults are reported.
 const FORGOTTEN_NS: u64 = 10_000_000_000;
@@ -11,22 +12,22 @@ const AGAIN_NS: u64 = 1_000_000_000;
 /// Longest foreign name in a text, bytes: a name may be as long as a message.
 const NAME_BYTES_MAX: usize = 128;
 
-/// Recent texts without their numbers, and when they last applied, nanoseconds of `CLOCK_BOOTTIME`. Most callers report
-/// a few texts per half second, or texts about sources; texts about shortened responses come at the rate of requests.
+/// Hashes of recent texts without their numbers, and when they last applied, nanoseconds of `CLOCK_BOOTTIME`. Not the
+/// texts themselves: those about requests hold what peers wrote, and come at the rate of requests.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Told(BTreeMap<String, u64>);
+pub(super) struct Told(BTreeMap<u64, u64>);
 
 impl Told {
     /// Whether a state is new: it applies now, and did not recently.
     pub(super) fn is_new(&mut self, words: &str, now_ns: u64) -> bool {
         self.forget(now_ns);
-        self.0.insert(gist(words), now_ns).is_none()
+        self.0.insert(key(words), now_ns).is_none()
     }
 
     /// Whether an event must be reported: the last report of it is at least one second old.
     pub(super) fn is_due(&mut self, words: &str, now_ns: u64) -> bool {
         self.forget(now_ns);
-        let last_ns = self.0.entry(gist(words)).or_default();
+        let last_ns = self.0.entry(key(words)).or_default();
         let due = *last_ns == 0 || now_ns.saturating_sub(*last_ns) >= AGAIN_NS;
         if due {
             *last_ns = now_ns;
@@ -35,9 +36,15 @@ impl Told {
     }
 
     fn forget(&mut self, now_ns: u64) {
-        let holds = |_: &String, at: &mut u64| now_ns.saturating_sub(*at) < FORGOTTEN_NS;
+        let holds = |_: &u64, at: &mut u64| now_ns.saturating_sub(*at) < FORGOTTEN_NS;
         self.0.retain(holds);
     }
+}
+
+fn key(words: &str) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    gist(words).hash(&mut hasher);
+    hasher.finish()
 }
 
 /// A text without decimal numbers such as `3.002`, which differ from one look to the next.

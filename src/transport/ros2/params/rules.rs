@@ -1,6 +1,7 @@
 //! Which values parameters take, and what to write instead. Pure.
 
 use super::super::params_file::Value;
+use super::super::told::brief;
 use crate::config::Mode;
 
 /// Which values a parameter takes.
@@ -71,6 +72,7 @@ impl Rule {
                 if words.contains(&text.as_str()) {
                     return Ok(());
                 }
+                let text = brief(text);
                 Err(format!("{name} is `{text}`: write {}", words.join(" or ")))
             }
             (Self::Mode, Value::Text(text)) => match Mode::parse(text)? {
@@ -79,7 +81,10 @@ impl Rule {
                     Some(_) => Err(format!(
                         "source {source} sends poses body by body on ROS 2 topics, and cannot lead: write on_all or rate=HZ"
                     )),
-                    None => Err(format!("{name}: the scene has no source `{source}`")),
+                    None => {
+                        let source = brief(&source);
+                        Err(format!("{name}: the scene has no source `{source}`"))
+                    }
                 },
                 _ => Ok(()),
             },

@@ -62,6 +62,9 @@ fn each_value_out_of_range_has_its_reason() {
         ("mode", Value::Text("fast".to_owned()), "rate=HZ"),
         ("publish_markers", Value::Whole(1), "true or false"),
         ("budget_ms", Value::List(vec![Value::Real(1.0)]), "a number"),
+        // A peer's text is written on one line.
+        ("mode", Value::Text("on_frame=a\nb".to_owned()), "a\\nb"),
+        ("a\nb", Value::Real(1.0), "no parameter `a\\nb`"),
     ] {
         let why = table.check(name, &value).unwrap_err();
         assert!(why.contains(word), "{name}: {why}");
