@@ -280,7 +280,7 @@ impl Inlet {
         all.extend(self.lines.iter().filter_map(|line| line.fault(now_ns)));
         all.extend(self.shared_topics());
         all.extend(self.unheard().into_iter().take(FAULTS_MAX));
-        for source in &self.sources {
+        for source in &mut self.sources {
             // Sources of one topic say the same of what is not theirs.
             for fault in source.faults(FAULTS_MAX, now_ns) {
                 if !all.contains(&fault) {

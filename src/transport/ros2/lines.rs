@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use ros2_client::{Context, Gid, MessageInfo, Node, Subscription};
 use rustdds::mio1::{Interest, Registry, Token};
+use serde::de::DeserializeOwned;
 
 use super::names::Names;
 use super::order::Order;
@@ -36,6 +37,8 @@ const FIXED_LINKS: In = In {
 };
 /// The newest is all that counts.
 const NEWEST: In = In { depth: 1, ..FRAMES };
+/// More samples than a topic keeps.
+const FORMER_MAX: usize = 1 << 16;
 const TF: TypeName = ("tf2_msgs", "TFMessage");
 
 /// A subscription and where its messages go.
@@ -227,11 +230,28 @@ pub(super) fn of_body(
     };
     Ok(if kind == RosKind::Pose {
         let kind = ("geometry_msgs", "PoseStamped");
-        Line::Pose(subscription(node, context, (topic, kind), quality)?, feeder)
+        let from = subscription(node, context, (topic, kind), quality)?;
+        pass_over_former(&from);
+        Line::Pose(from, feeder)
     } else {
         let kind = ("nav_msgs", "Odometry");
-        Line::Odometry(subscription(node, context, (topic, kind), quality)?, feeder)
+        let from = subscription(node, context, (topic, kind), quality)?;
+        pass_over_former(&from);
+        Line::Odometry(from, feeder)
     })
+}
+
+/// Discards the samples that a new subscription already holds.
+///
+/// `RustDDS` 0.15 keeps the last samples of a topic for as long as the participant lives, and gives them to each new
+/// reader as if they had just been received. Of a topic that was subscribed to before they may be of any age, and no
+/// evidence of where the body is.
+fn pass_over_former<M: DeserializeOwned + 'static>(from: &Subscription<M>) {
+    for _ in 0..FORMER_MAX {
+        if matches!(from.take(), Ok(None)) {
+            return;
+        }
+    }
 }
 
 /// The bodies that have a subscription: place of the source, and the body's own among those of the source.

@@ -62,6 +62,8 @@ struct Member {
     told_late: bool,
     /// Start of its pose's age, nanoseconds of `CLOCK_BOOTTIME`; `None`: no pose, or a pose that does not age.
     since_ns: Option<u64>,
+    /// First look at faults at which it had no pose, nanoseconds of `CLOCK_BOOTTIME`; `None`: no look yet.
+    awaited_ns: Option<u64>,
     /// Its current fault, for messages.
     fault: Option<String>,
 }
@@ -131,7 +133,10 @@ impl Source {
     }
 
     /// The current faults of its bodies, at most `most`. Attached bodies are skipped: their source does not move them.
-    pub(super) fn faults(&self, most: usize, now_ns: u64) -> Vec<String> {
+    pub(super) fn faults(&mut self, most: usize, now_ns: u64) -> Vec<String> {
+        for member in &mut self.members {
+            member.awaited_ns.get_or_insert(now_ns);
+        }
         let members = self.members.iter();
         let members = members.filter(|member| member.seat != NOBODY && !member.seat.attached);
         let faulty = members.filter_map(|member| {
@@ -154,6 +159,7 @@ impl Source {
         for member in &mut self.members {
             member.order = Order::default();
             (member.last, member.since_ns) = (None, None);
+            member.awaited_ns = None;
         }
     }
 

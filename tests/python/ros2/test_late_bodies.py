@@ -144,6 +144,24 @@ def test_many_bodies_with_topics_of_their_own_in_one_edit_are_all_heard(room):
     room.until(all_known, "all of them known", then=send)
 
 
+@pytest.mark.parametrize("kind", ["pose", "odometry"])
+def test_bug_a_body_that_came_again_was_known_by_the_last_message_of_before(room, kind):
+    late = Late(room)
+    source, options, topic = KINDS[kind]
+    assert put(room, "late", source, **options).success
+    room.until(lambda: late.where("late") == ([7, 0, 0], 0), "known", then=lambda: late.send(kind, topic, 7.0))
+    # a second body on the topic while the first is heard no more, and the first again
+    assert put(room, "other", source, **options).success
+    assert room.call(RemoveBody, "/sweepd/remove_body", RemoveBody.Request(name="late")).success
+    assert put(room, "late", source, **options).success
+    until = time.monotonic() + 1.0
+    while time.monotonic() < until:
+        late.feeder()
+        room.spin(0.02)
+        assert late.where("late")[1] != 0 and late.where("other")[1] != 0
+    room.until(lambda: late.where("late") == late.where("other") == ([8, 0, 0], 0), "known again", then=lambda: late.send(kind, topic, 8.0))
+
+
 def test_a_chain_that_never_changes_makes_a_late_body_known_at_once(room):
     late = Late(room)
     # its frame is the end of a chain that was said long ago

@@ -19,6 +19,7 @@ impl Member {
             told_ns: 0,
             told_late: false,
             since_ns: None,
+            awaited_ns: None,
             fault: None,
         }
     }

@@ -5,6 +5,7 @@
 use std::collections::VecDeque;
 
 use super::super::told::{brief, gist};
+use super::RosKind;
 use super::{Member, Receipt, Source, seconds};
 
 /// How long a passing fault is reported, nanoseconds: long enough for a person to see it.
@@ -46,9 +47,20 @@ impl Source {
         }
     }
 
-    /// The fault of a body whose newest pose is older than the time-out.
+    /// The fault of a body whose newest pose is older than the time-out, or that has had none for longer than that.
     pub(super) fn silence(&self, member: &Member, now_ns: u64) -> Option<String> {
-        let silent_ns = now_ns.saturating_sub(member.since_ns?);
+        let Some(since_ns) = member.since_ns else {
+            // Chains say themselves which link they lack.
+            let awaited = self.kind != RosKind::Tf && member.fault.is_none();
+            let awaited_ns = member.awaited_ns.filter(|_| awaited)?;
+            return (now_ns.saturating_sub(awaited_ns) > self.timeout_ns).then(|| {
+                format!(
+                    "no pose of it has come on {}: see whether its sender runs, and uses this topic and type",
+                    brief(&member.topic)
+                )
+            });
+        };
+        let silent_ns = now_ns.saturating_sub(since_ns);
         (silent_ns > self.timeout_ns).then(|| {
             format!(
                 "nothing has come of it for {:.1} s, longer than the time-out of its source: see who sends it",

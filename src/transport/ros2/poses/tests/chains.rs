@@ -45,20 +45,20 @@ fn bug_two_publishers_of_a_fixed_link_that_differ_were_told_nowhere() {
         from: Gid::from([number; 16]),
         ..at(now_ns)
     };
-    let told = |one: &Source, now_ns| {
+    let told = |one: &mut Source, now_ns| {
         let told = one.faults(9, now_ns);
         told.iter()
             .any(|f| f.contains("frame tool: another publisher"))
     };
     one.take_links(&link("world", "tool", 0), true, from(1, MS));
     one.take_links(&link("world", "tool", MS), true, from(2, MS));
-    assert!(!told(&one, MS), "it is the same link");
+    assert!(!told(&mut one, MS), "it is the same link");
     let mut other = link("world", "tool", 0);
     other.transforms[0].transform.translation.x = 7.0;
     one.take_links(&other, true, from(2, 2 * MS));
-    assert!(!told(&one, 2 * MS), "its sender changed it");
+    assert!(!told(&mut one, 2 * MS), "its sender changed it");
     one.take_links(&link("world", "tool", 0), true, from(1, 3 * MS));
-    assert!(told(&one, 3 * MS));
+    assert!(told(&mut one, 3 * MS));
 }
 
 #[test]
