@@ -1,21 +1,20 @@
-//! The dependency rule: a module of `src` (a room) may name only rooms on the lines above its own in `HOUSE`, and those
-//! to its left on the line of the foundation. Each external crate may be named only in its own files. Both are checked
-//! on the text of the sources.
+//! The dependency rule: a module of `src` (a room) may name only rooms on lines above its own in `HOUSE`. Each external
+//! crate may be named only in its own files. Both are checked on the text of the sources.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The rooms from the lowest to the highest layer. Rooms on one line other than the first may not name each other.
+/// The rooms from the lowest to the highest layer. Rooms on one line may not name each other.
 const HOUSE: &[&[&str]] = &[
-    // foundation
+    // foundation: used by all rooms
     &["error", "ids", "limits", "time", "math", "simd"],
-    // walls
+    // wire format and transport
     &["wire"],
     &["config"],
     &["transport"],
-    // corridor
+    // geometry and collision, from shapes to results
     &["shape"],
     &["scene"],
     &["world"],
@@ -26,7 +25,7 @@ const HOUSE: &[&[&str]] = &[
     // engine
     &["plan"],
     &["tick"],
-    // around
+    // users of the engine
     &["query"],
     &["builtin"],
     &["record"],
