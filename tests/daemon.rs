@@ -1,5 +1,5 @@
 //! Goal: the daemon as a client sees it, over shared memory between processes. Method: the real binary as a child, the
-//! Rust client in this process. No test requires a short duration, so other load on the machine does no harm.
+//! Rust client in this process. The few limits on durations are wide, because other load may slow the machine.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
