@@ -1,16 +1,17 @@
-//! Budgets above the floor: how far a tick overshoots, on the wall and on the thread's CPU clock, and how much of what
-//! is left above the floor is used while work remains: before and after publishing on the wall clock, before alone, and
-//! on the CPU clock at least (a thread that waits for its core uses up the wall's time, and none of the core's).
+//! Budgets above the floor: by how much a tick overshoots, in wall time and in the thread's CPU time, and how much of
+//! the time above the floor is used while work remains. That share is given in wall time for work before and after
+//! publishing, in wall time for work before publishing alone, and as a lower bound in CPU time (waiting for a core uses
+//! wall time but no CPU time).
 //!
-//! Beside each tick stands a control, right after it and of the same length: a thread that does nothing but look at
-//! the clock until the time is up. What that overshoots by is the machine's (interrupts, and a host that serves
-//! others); a tick can only end that much the earlier, which costs it as much of its budget.
+//! Each tick is followed by a control of the same length: a thread that only polls the clock until the time is up. Its
+//! overshoot is caused by the machine (interrupts, a host with other guests); a tick could only avoid this overshoot by
+//! ending earlier by as much, which would cost that part of its budget.
 //!
-//! Scenes: `pool`, `pool(4000, 11)`, each body 1 % of its size a tick, pairs and contacts asked for; `meshes`, 200
-//! pairs of meshes of 19,880 triangles (`benches/time_critical`), 0.5 % of their diameter a tick, the same asked for;
-//! and `meshes_regions`, the same with a reader of `regions`.
+//! Scenes: `pool`, `pool(4000, 11)`, each body moved by 1 % of its size per tick, with pairs and contacts in demand;
+//! `meshes`, 200 pairs of meshes of 19,880 triangles (`benches/time_critical`), moved by 0.5 % of their diameter per
+//! tick, with the same demand; and `meshes_regions`, the same with `regions` in demand too.
 //!
-//! `cargo bench --bench budget [-- --quick] [SCENE..]`; rows of scenes that are not named stay as they are
+//! `cargo bench --bench budget [-- --quick] [SCENE..]`; saved rows of scenes that are not named are kept
 
 #![allow(clippy::cast_precision_loss, reason = "a bench")]
 
@@ -36,10 +37,10 @@ use sweepd::wire::{Demand, Stage, TransformRow};
 
 const SEED: u64 = 11;
 const SCENES: [&str; 3] = ["pool", "meshes", "meshes_regions"];
-/// Ticks before those that count.
+/// Ticks before the measurement.
 const WARM_UP: usize = 40;
 
-/// What moves the bodies of a scene.
+/// The motion of the bodies of a scene.
 enum Motion {
     Flight(Box<Flight>, Vec<TransformRow>),
     Courses(Courses),
@@ -104,20 +105,20 @@ fn main() {
     save("budget.csv", &csv);
 }
 
-/// The control: looks at the clock for so long; by how much it overshoots on the thread's CPU clock, nanoseconds.
+/// The control: polls the clock for `ns`; returns its overshoot on the thread's CPU clock, nanoseconds.
 fn look_for(ns: u64) -> u64 {
     let from = [SystemClock.monotonic_ns(), SystemClock.thread_cpu_ns()];
     while SystemClock.monotonic_ns() < from[0] + ns {}
     (SystemClock.thread_cpu_ns() - from[1]).saturating_sub(ns)
 }
 
-/// Quantiles of what was overshot by, microseconds: 50, 99 and 99.9 %.
+/// Quantiles of overshoots, microseconds: 50, 99 and 99.9 %.
 fn overshoots(times: &mut [u64]) -> String {
     let at = [0.5, 0.99, 0.999].map(|share| quantile(times, share) as f64 / 1e3);
     at.map(|us| format!("{us:.1}")).join(",")
 }
 
-/// One scene within one budget; its columns from `scene` on.
+/// Runs one scene with one budget; returns its CSV columns from `scene` on.
 fn run(scene: &str, meshes: &[Arc<Shape>], above_us: u64, ticks: usize) -> String {
     let (mut bench, mut motion) = start(scene, meshes);
     let demand = Demand {
@@ -134,11 +135,11 @@ fn run(scene: &str, meshes: &[Arc<Shape>], above_us: u64, ticks: usize) -> Strin
     let (mut open, mut all) = (0_u64, 0_u64);
     for tick in 0..ticks + WARM_UP {
         let rows = motion.next();
-        // The budget a user would set: the floor as published so far, and so much above it.
+        // The budget that a user would set: the median of the floors published so far, plus `above_us`.
         let floor_ns = if floors.is_empty() {
             5_000_000
         } else {
-            // Of a copy, for it is sorted: the first of these is to stay the oldest.
+            // `quantile` sorts its argument; `floors` must stay in order of age.
             quantile(&mut floors.clone(), 0.5)
         };
         let budget_ns = floor_ns + above_us * 1_000;
@@ -152,7 +153,7 @@ fn run(scene: &str, meshes: &[Arc<Shape>], above_us: u64, ticks: usize) -> Strin
             continue;
         }
         publish.push(out.stage_ns[usize::from(Stage::Publish.code())]);
-        // Below its own floor a tick takes the floor: then there is nothing to overshoot by.
+        // A tick whose budget is below its floor takes the floor; only time beyond the floor is overshoot then.
         let limit_ns = budget_ns.max(out.floor_ns);
         wall.push(took.wall_ns.saturating_sub(limit_ns));
         cpu.push(took.cpu_ns.saturating_sub(limit_ns));
@@ -160,7 +161,7 @@ fn run(scene: &str, meshes: &[Arc<Shape>], above_us: u64, ticks: usize) -> Strin
         if out.possible > 0 && budget_ns > out.floor_ns {
             used += out.stage_ns[usize::from(Stage::Narrow.code())] + took.rest_ns;
             told += out.stage_ns[usize::from(Stage::Narrow.code())];
-            // What the thread ran beyond the floor, which is wall time: no less was used.
+            // A lower bound of the CPU time used: the floor is wall time, which is at least its CPU time.
             used_cpu += took.cpu_ns.saturating_sub(out.floor_ns);
             offered += budget_ns - out.floor_ns;
         }

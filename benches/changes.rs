@@ -1,9 +1,9 @@
-//! What it costs to publish the list of pairs: all of it each tick (`pairs`), or what is new in it (`changes`); beside
-//! them what a tick without readers spends there. Engines on one scene at the same poses, tick by tick in turn; `copy`
-//! is the message copied once, as a transport does it into shared memory.
+//! The cost of publishing the list of pairs: the whole list in each tick (`pairs`), or only its changes (`changes`),
+//! compared with a tick without readers (`nobody`). All engines have the same scene and poses and take turns tick by
+//! tick; `copy` is one copy of the message, as a transport makes it into shared memory.
 //!
 //! `cargo bench --bench changes [-- --quick] [--case=N] [--only=nobody|pairs|changes]`; a single case, counted from 0,
-//! or a single reader (to count instructions) is printed and not saved.
+//! or a single reader (useful to count instructions) is printed and not saved.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a bench")]
 
@@ -14,26 +14,26 @@ use sweepd::builtin::pool;
 use sweepd::time::{Budget, Clock, SystemClock};
 use sweepd::wire::{Demand, PairRow};
 
-/// What is run: bodies, how many of them move in percent, ticks.
+/// The cases: bodies, percentage of them that moves, ticks.
 const CASES: [(usize, usize, usize); 4] = [
     (10_000, 100, 100),
     (10_000, 1, 200),
     (100_000, 10, 40),
     (100_000, 1, 100),
 ];
-/// Metres a tick: a hundredth of a body's size.
+/// Motion per tick, metres: one percent of a body's size.
 const STEP_M: f64 = 0.0075;
-/// Ticks before the count begins.
+/// Ticks before the measurement.
 const SETTLE: usize = 20;
 const SEED: u64 = 11;
 const READERS: [&str; 3] = ["nobody", "pairs", "changes"];
 
-/// An engine with its reader, and what was measured of it.
+/// An engine with its reader, and the measured values.
 struct Side {
     reader: &'static str,
     demand: Demand,
     bench: Bench,
-    /// Where the message is copied to.
+    /// Target of the copy of the message.
     sent: Vec<PairRow>,
     publish_ns: Vec<u64>,
     copy_ns: Vec<u64>,
@@ -132,9 +132,9 @@ fn main() {
     }
 }
 
-/// One case; the columns of each reader.
+/// Runs one case; returns the CSV columns of each reader.
 fn run(bodies: usize, moving: usize, ticks: usize, only: Option<&'static str>) -> Vec<String> {
-    // Who does not move is not sent again, and is to stay known.
+    // Bodies that do not move are not sent again; the long timeout keeps them from becoming stale.
     let scene = pool(bodies, SEED).replace("timeout_ms = 500", "timeout_ms = 600000");
     let readers = READERS.into_iter();
     let wanted = readers.filter(|reader| only.is_none_or(|only| only == *reader));
@@ -145,7 +145,7 @@ fn run(bodies: usize, moving: usize, ticks: usize, only: Option<&'static str>) -
     let mut rows: Vec<_> = who.iter().map(|at| all[*at]).collect();
     for tick in 0..ticks + SETTLE {
         if tick == 0 {
-            // At first everybody has a place.
+            // The first frame gives every body a pose.
             sides
                 .iter_mut()
                 .for_each(|side| side.tick(&all, true, false));
@@ -155,7 +155,7 @@ fn run(bodies: usize, moving: usize, ticks: usize, only: Option<&'static str>) -
         for (to, at) in rows.iter_mut().zip(&who) {
             *to = row(to.body, &flight.poses[*at]);
         }
-        // Each is first in turn.
+        // Rotates the order of the engines, so that each is first equally often.
         let first = tick % sides.len();
         for side in 0..sides.len() {
             let at = (first + side) % sides.len();

@@ -1,6 +1,6 @@
-//! A body of 19,880 triangles that deforms, in contact with a rigid one: what an update costs at once (copy,
-//! displacement, box: the floor), what its refit costs of the budget, and what a third of the units that the whole
-//! needs leaves open.
+//! A deforming body of 19,880 triangles in contact with a rigid one: the cost of an update that is due immediately
+//! (copy, displacement, box: part of the floor), the cost of its refit, which counts towards the budget, and which
+//! verdicts remain open with a third of the work units of a full tick.
 //!
 //! `cargo bench --bench deforming [-- --quick]`
 
@@ -35,7 +35,7 @@ use sweepd::wire::{
     WIRE_VERSION, frame_flags, name_bytes, vertex_flags,
 };
 
-/// An engine with the two bodies, and what is sent.
+/// An engine with the two bodies, and the vertices that are sent.
 struct Rig {
     engine: Engine,
     clock: Arc<SystemClock>,
@@ -44,7 +44,7 @@ struct Rig {
     version: u64,
 }
 
-/// What one tick said.
+/// The result of one tick.
 struct Told {
     units: u64,
     verdict: Verdict,
@@ -70,7 +70,7 @@ impl Rig {
         }
     }
 
-    /// A wave through the mesh: `by_m` at most, another phase with each step.
+    /// Deforms the mesh by a wave of amplitude at most `by_m`; its phase changes with each step.
     fn bend(&mut self, step: usize, by_m: f64) {
         let phase = 0.3 * step as f64;
         for (row, rest) in self.rows.iter_mut().zip(&self.rest) {
@@ -97,7 +97,7 @@ impl Rig {
         into.set_rows(&self.rows);
     }
 
-    /// A tick with new vertices; the other body at `x`.
+    /// Runs a tick with new vertices, and the other body at `x`.
     fn tick(&mut self, x: f64, budget: Budget) -> Told {
         let mut inbox = Inbox::default();
         let mut vertices = VertexFrame::default();
@@ -138,7 +138,7 @@ impl Rig {
     }
 }
 
-/// Where figures go.
+/// Collects the measured values as CSV.
 struct Table {
     csv: String,
     from: String,
@@ -154,7 +154,7 @@ impl Table {
     }
 }
 
-/// Admission and refit by themselves.
+/// Measures admission and refit separately.
 fn pieces(text: &str, table: &mut Table) {
     let mut rig = Rig::new(text);
     rig.tick(5.0, Budget::UNLIMITED);
@@ -174,7 +174,7 @@ fn pieces(text: &str, table: &mut Table) {
         world.refit(slot, usize::MAX);
         let fitted_ns = rig.clock.monotonic_ns();
         assert!(!world.body(slot).unwrap().lags());
-        // The first copies what the engine's world holds, too.
+        // The first step also copies data that the cloned world shares with the engine's world; it is not counted.
         if step > 0 {
             copy.push(copied_ns - start_ns);
             admit.push(admitted_ns - ready_ns);
@@ -188,7 +188,7 @@ fn pieces(text: &str, table: &mut Table) {
     table.say("together us", &mut all, 1e3);
 }
 
-/// A pair in and out of contact: what all of it takes, and what a third of that leaves open.
+/// A pair that enters and leaves contact: the work of full ticks, and which verdicts remain open with a third of it.
 fn a_third(text: &str, table: &mut Table) {
     let course = |step: usize| 1.88 + 0.1 * (0.05 * step as f64).sin();
     let (mut whole, mut third) = (Rig::new(text), Rig::new(text));

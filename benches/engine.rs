@@ -1,9 +1,9 @@
-//! A whole engine tick against rapier3d-f64's `CollisionPipeline`, same convex bodies, same poses, contacts asked of
-//! both, in one run, tick by tick in turn. Timed on both sides: taking the poses in, broad phase, narrow phase,
-//! contacts; on ours also the filled outbox: of the list of pairs and of contacts all rows, or those that are new.
+//! A whole engine tick against rapier3d-f64's `CollisionPipeline`: the same convex bodies, poses and demand for
+//! contacts, in one run, in turn tick by tick. Timed on both sides: reading the poses, broad phase, narrow phase,
+//! contacts; on our side also filling the outbox with all rows of pairs and contacts, or with their changes only.
 //!
 //! `cargo bench --bench engine [-- --quick | --case=N [--ticks=N]]`; a single case, counted from 0, is printed and not
-//! saved; for so many ticks in place of its own.
+//! saved; `--ticks` replaces its number of ticks.
 
 #![allow(
     clippy::unwrap_used,
@@ -28,19 +28,19 @@ use sweepd::shape::ShapeSpec;
 use sweepd::time::{Budget, Clock, SystemClock};
 use sweepd::wire::Demand;
 
-/// How pairs and contacts are asked for.
+/// How pairs and contacts are published.
 #[derive(Clone, Copy, Debug)]
 enum Rows {
-    /// All of it in each tick.
+    /// All rows of pairs and of contacts in each tick.
     Pairs,
-    /// All contacts, and of the list of pairs what is new.
+    /// All contacts, but only changes of the list of pairs.
     Changes,
-    /// What is new in both, by which who listens keeps them: as rapier keeps its own.
+    /// Only changes of both; the reader keeps its own lists, as rapier does internally.
     News,
 }
 
 impl Rows {
-    /// With what rapier's pipeline yields too: contacts.
+    /// The demand; it includes contacts, which rapier's pipeline computes too.
     fn demand(self) -> Demand {
         Demand {
             pairs: matches!(self, Self::Pairs),
@@ -60,7 +60,7 @@ impl Rows {
     }
 }
 
-/// Rapier's side of the same scene.
+/// The same scene in rapier.
 struct Peer {
     pipeline: CollisionPipeline,
     islands: IslandManager,
@@ -76,7 +76,7 @@ impl Peer {
         let mut colliders = ColliderSet::new();
         let mut handles = Vec::new();
         for body in scene.bodies.iter().filter(|body| body.moves) {
-            // Cylinder and cone stand along y there, along z here.
+            // Rapier's cylinders and cones have their axis along y, ours along z.
             let (builder, upright) = match &body.shapes[0].shape {
                 ShapeSpec::Sphere { radius } => (ColliderBuilder::ball(*radius), false),
                 ShapeSpec::Box {
@@ -117,7 +117,7 @@ impl Peer {
         }
     }
 
-    /// * `moved` - places of the bodies that have another pose.
+    /// * `moved` - indices of the bodies whose pose has changed.
     fn tick(&mut self, poses: &[Pose], moved: impl Iterator<Item = usize>) -> u64 {
         let start_ns = SystemClock.monotonic_ns();
         for at in moved {
@@ -159,13 +159,13 @@ impl Peer {
     }
 }
 
-/// What is run.
+/// The parameters of a case.
 #[derive(Clone, Copy, Debug)]
 struct Case {
     bodies: usize,
-    /// How many of them move, percent.
+    /// Percentage of the bodies that moves.
     moving: usize,
-    /// By how much of their size in a tick, percent.
+    /// Motion per tick, percent of a body's size.
     speed: f64,
     ticks: usize,
     rows: Rows,
@@ -198,7 +198,7 @@ const CASES: [Case; 15] = [
     case(100_000, 1, 1.0, 60, Rows::Changes),
     case(100_000, 1, 1.0, 60, Rows::News),
 ];
-/// Ticks before the count begins.
+/// Ticks before the measurement.
 const SETTLE: usize = 20;
 const SEED: u64 = 11;
 
@@ -231,7 +231,7 @@ fn main() {
     save("engine.csv", &csv);
 }
 
-/// One case; its columns of the CSV.
+/// Runs one case; returns its columns of the CSV.
 fn run(case: Case) -> String {
     let Case {
         bodies,
@@ -240,7 +240,8 @@ fn run(case: Case) -> String {
         ticks,
         rows: asked,
     } = case;
-    // Who does not move is not sent again, and is to stay known; and no contact is left out.
+    // Bodies that do not move are not sent again, so the timeout is long; `contact_rows` is large enough for all
+    // contacts.
     let scene = pool(bodies, SEED).replace("timeout_ms = 500", "timeout_ms = 600000")
         + "\n[limits]\ncontact_rows = 1048576\n";
     let mut ours = Bench::new(&scene);
@@ -253,7 +254,7 @@ fn run(case: Case) -> String {
     let all = ours.rows.clone();
     let mut rows: Vec<_> = who.iter().map(|at| all[*at]).collect();
     for tick in 0..ticks + SETTLE {
-        // At first everybody has a place.
+        // The first frame gives every body a pose.
         let own = if tick == 0 {
             peer.tick(&flight.poses, 0..bodies);
             ours.tick(&all, true, Budget::UNLIMITED, asked.demand())

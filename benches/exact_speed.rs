@@ -1,4 +1,4 @@
-//! Nanoseconds a query, against parry3d-f64's `contact` and `contact_manifolds` on the same pairs.
+//! Nanoseconds per query, compared with parry3d-f64's `distance`, `contact` and `contact_manifolds` on the same pairs.
 //!
 //! `cargo bench --bench exact_speed`
 #![allow(
@@ -22,7 +22,7 @@ use sweepd::math::{Point, Pose, Vec3};
 use sweepd::narrow::exact::{Manifold, Warm, convex_gap, manifold};
 use sweepd::shape::Convex;
 
-/// Within a cube of edge 1 about the origin.
+/// A random vector within a cube of edge 1 about the origin.
 fn vector(r: &mut Random) -> Vec3 {
     Vec3::from_fn(|_, _| r.range(-0.5, 0.5))
 }
@@ -31,7 +31,7 @@ fn hull_points(r: &mut Random, count: usize) -> Vec<Vec3> {
     (0..count).map(|_| vector(r).normalize() * 0.5).collect()
 }
 
-/// Parry's capsules, cylinders and cones stand along y, ours along z.
+/// Parry's capsules, cylinders and cones have their axis along y, ours along z.
 fn upright(of: &Both) -> Pose {
     let turned = ["capsule", "cylinder", "cone"].contains(&of.0);
     let angle = if turned {
@@ -42,7 +42,7 @@ fn upright(of: &Both) -> Pose {
     Pose::rotation(Vec3::x() * angle)
 }
 
-/// The pose of the second in the frame of the first, as parry has these.
+/// The pose of the second shape in the frame of the first, for shapes with parry's axes.
 fn to_parry(a: &Both, b: &Both, pose: &Pose) -> glamx::DPose3 {
     let pose = upright(a).inverse() * pose * upright(b);
     let (t, q) = (&pose.translation.vector, pose.rotation.as_vector());
@@ -64,7 +64,7 @@ fn nanos(poses: &[Pose], mut each: impl FnMut(usize, &Pose)) -> f64 {
     best
 }
 
-/// Which of [`shapes`] are asked against which.
+/// The pairs that are measured, as indices into [`shapes`].
 const PAIRS: [(usize, usize); 11] = [
     (0, 0),
     (0, 1),
@@ -78,14 +78,14 @@ const PAIRS: [(usize, usize); 11] = [
     (4, 4),
     (1, 5),
 ];
-/// A name, and between which gaps the poses are, metres.
+/// Name of a regime and the range of gaps of its poses, metres.
 const REGIMES: [(&str, f64, f64); 3] = [
     ("apart", 0.05, 0.6),
     ("touch", -0.01, 0.01),
     ("deep", -0.25, -0.05),
 ];
 
-/// A name, the shape, and the same of parry.
+/// A name, our shape, and the same shape of parry.
 type Both = (&'static str, Convex, Box<dyn Shape>);
 
 fn shapes() -> Vec<Both> {
@@ -130,7 +130,7 @@ fn shapes() -> Vec<Both> {
     ]
 }
 
-/// Random poses with gaps between `low` and `high`.
+/// Random poses with gaps between `low` and `high`, metres.
 fn poses_of(r: &mut Random, a: &Both, b: &Both, low: f64, high: f64) -> Vec<Pose> {
     let mut poses = Vec::new();
     while poses.len() < 1000 {
@@ -147,7 +147,7 @@ fn poses_of(r: &mut Random, a: &Both, b: &Both, low: f64, high: f64) -> Vec<Pose
     poses
 }
 
-/// Cold, warm, manifold.
+/// Times of the cold query, the warm query and the manifold, nanoseconds.
 fn ours(a: &Both, b: &Both, poses: &[Pose]) -> [f64; 3] {
     let cold = nanos(poses, |_, p| {
         std::hint::black_box(convex_gap(&a.1, &b.1, p, &mut Warm::default()));
@@ -168,7 +168,7 @@ fn ours(a: &Both, b: &Both, poses: &[Pose]) -> [f64; 3] {
     [cold, warm, points]
 }
 
-/// Distance, contact, manifold cold and warm.
+/// Times of distance, contact, cold manifold and warm manifold, nanoseconds.
 fn parrys(a: &Both, b: &Both, poses: &[Pose]) -> [f64; 4] {
     let parry_poses: Vec<_> = poses.iter().map(|pose| to_parry(a, b, pose)).collect();
     let distance = nanos(poses, |k, _| {
@@ -217,7 +217,7 @@ fn parrys(a: &Both, b: &Both, poses: &[Pose]) -> [f64; 4] {
     [distance, contact, cold_m, warm_m]
 }
 
-/// The two engines measure the same: the distances of what is apart are equal.
+/// Checks that both libraries get the same distances for separated pairs.
 fn agree(a: &Both, b: &Both, poses: &[Pose]) {
     for pose in poses {
         let gap = convex_gap(&a.1, &b.1, pose, &mut Warm::default());

@@ -1,26 +1,24 @@
-//! A constant frame rate: a source whose own work takes 7 to 15 ms of each frame of 20 ms, and a daemon whose ticks
-//! would take longer than what is left of any of them.
+//! A constant frame rate: a source that works for 7 to 15 ms of each frame of 20 ms, and a daemon whose unlimited ticks
+//! take longer than the rest of any frame.
 //!
-//! * `machine` - no daemon: the source works, and then looks at the clock until the result would be there. What is
-//!   late here is the machine's doing.
-//! * `deadline`, `time_left` - the frame says when its time is up, or how much it has left; the daemon has no budget of
+//! * `machine` - no daemon: the source works, then polls the clock until the result would be due. Frames that are
+//!   late in this case are late because of the machine.
+//! * `deadline`, `time_left` - the frame carries its deadline, or the time it has left; the daemon has no budget of
 //!   its own.
-//! * `fixed` - the frame says nothing, the daemon has a budget: what the source leaves on average, and what it leaves
-//!   at least.
-//! * `unlimited` - neither: what the daemon would take.
+//! * `fixed` - the frame carries neither; the daemon's budget is the mean time that the source leaves, or the least.
+//! * `unlimited` - no limit: the time that the daemon takes for all its work.
 //!
 //! Scene: `meshes` of `benches/budget.rs`, 200 pairs of meshes of 19,880 triangles, here moved by 5 % of their diameter
-//! a frame; pairs and contacts are listened to.
+//! per frame; the client subscribes to pairs and contacts.
 //!
-//! Method: a daemon as `sweepd run` makes it, in a process of its own (this program again), in lockstep over shared
-//! memory. The source's work is drawn anew for each frame, the same for all cases, and it is work, not sleep. Then the
-//! source sends the frame and waits for that frame's result; what is left after that it sleeps. A frame that is late
-//! delays the begin of the next.
+//! Method: a daemon as `sweepd run` makes it, in its own process (this program again), in lockstep over shared memory.
+//! The source's work per frame is random, the same for all cases, and busy, not sleeping. Then the source sends the
+//! frame, waits for its result and sleeps for the rest of the frame. A late result delays the start of the next frame.
 //!
-//! `total`: from the begin of a frame to its result. `used`: from sending to the result, as a share of what the source
-//! left of the frame; `used_with_rest` counts what the daemon went on to work after it, too. `undecided`: pairs without
-//! a verdict, of all candidates. `unfinished`: of the pairs told, those whose bounds or contacts were not finished at
-//! the frame's poses. `preempted`: the times that the scheduler took the core from source or daemon.
+//! `total`: from the start of a frame to its result. `used`: from sending to the result, as a share of the time that
+//! the source left of the frame; `used_with_rest` adds the daemon's work after publishing. `undecided`: share of
+//! candidate pairs without a verdict. `unfinished`: share of published pairs whose bounds or contacts were not complete
+//! at the poses of the frame. `preempted`: number of times that the scheduler preempted source or daemon.
 //!
 //! `cargo bench --bench frame_rate [-- FRAMES]`
 #![allow(
@@ -60,26 +58,27 @@ use sweepd::wire::{Level, Stage, TransformRow};
 const SEED: u64 = 11;
 const SECOND_NS: u64 = 1_000_000_000;
 const FRAME_NS: u64 = 20_000_000;
-/// The source's own work: shortest and longest.
+/// The source's own work per frame: shortest and longest.
 const WORK_NS: [u64; 2] = [7_000_000, 15_000_000];
-/// Kept back of each frame for the way there and back, as `sweepd feed --work` does: two wake-ups, reading the rows.
+/// Reserved in each frame for the transfer both ways, as in `sweepd feed --work`: two wake-ups and reading the rows.
 const WAY_NS: u64 = 300_000;
-/// What the source leaves of a frame for the tick on average, and at least.
+/// The time the source leaves for the tick: the mean (`MEAN_NS`) and the least (`LEAST_NS`).
 const MEAN_NS: u64 = FRAME_NS - (WORK_NS[0] + WORK_NS[1]) / 2 - WAY_NS;
 const LEAST_NS: u64 = FRAME_NS - WORK_NS[1] - WAY_NS;
-/// Motion of a surface point a frame, percent of the diameter: 5 m/s, so that little of what was proved holds on.
+/// Motion of a surface point per frame, percent of the diameter: 5 m/s, so that few proofs stay valid from frame to
+/// frame.
 const MOTION_PERCENT: f64 = 5.0;
 const FRAMES_DEFAULT: usize = 1_500;
 /// Frames before the measurement: the cold start, connections, growth of slices, page faults.
 const FRAMES_WARM: usize = 50;
-/// A frame without any limit takes many times 20 ms: so many fewer of these.
+/// A frame without a limit takes many times 20 ms, so that case runs this many times fewer frames.
 const UNLIMITED_PART: usize = 20;
 
 const COLUMNS: &str = "machine,commit,compiler,seed,case,budget_ms,pairs,frames,work_min_ms,work_p50_ms,work_max_ms,\
      total_p50_ms,total_p99_ms,total_max_ms,late_frames,preempted,used_percent,used_with_rest_percent,tick_p50_ms,\
      tick_max_ms,overruns,undecided_percent,unfinished_percent,contacts_mean\n";
 
-/// What a frame says of its end.
+/// How a frame limits the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Says {
     Nothing,
@@ -87,12 +86,12 @@ enum Says {
     TimeLeft,
 }
 
-/// Who answers frames, and what ends its work.
+/// Whether a daemon answers the frames, and what limits its work.
 struct Case {
     name: &'static str,
-    /// The daemon's budget; `None`: it has none.
+    /// The daemon's budget; `None`: no budget.
     budget_ns: Option<u64>,
-    /// `None`: nobody is asked.
+    /// The limit in the frames; `None`: there is no daemon.
     says: Option<Says>,
     frames: usize,
 }
@@ -119,7 +118,7 @@ fn cases(frames: usize) -> [Case; 6] {
 
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// The daemon's part: until its standard input ends.
+/// Runs the daemon until standard input ends.
 fn serve(root: &str, budget_ns: &str) {
     let (mut scene, placed) = bodies(&shapes());
     scene.config.mode = Mode::OnFrame("feed".to_owned());
@@ -144,14 +143,14 @@ fn serve(root: &str, budget_ns: &str) {
     daemon.run(&STOP, None).unwrap();
 }
 
-/// What was measured; times in nanoseconds, lists in the order of frames.
+/// Measured values; times in nanoseconds, lists in the order of frames.
 #[derive(Default)]
 struct Tally {
     work_ns: Vec<u64>,
-    /// From the frame's begin to its result.
+    /// From the start of the frame to its result.
     total_ns: Vec<u64>,
     tick_ns: Vec<u64>,
-    /// Sums over all frames.
+    /// From here on sums over all frames.
     left_ns: u64,
     used_ns: u64,
     rest_ns: u64,
@@ -163,7 +162,7 @@ struct Tally {
     contacts: usize,
 }
 
-/// The source's side of a daemon.
+/// The client that sends frames to a daemon.
 struct Asker {
     client: Client,
     says: Says,
@@ -193,7 +192,7 @@ impl Asker {
         }
     }
 
-    /// The poses of the next frame.
+    /// Computes the poses of the next frame.
     fn advance(&mut self) {
         self.courses.advance();
         self.rows.clear();
@@ -202,14 +201,14 @@ impl Asker {
 
     /// Sends the frame and waits for its result.
     ///
-    /// * `end_ns` - when the frame ends, monotonic.
+    /// * `end_ns` - end of the frame, monotonic clock.
     fn ask(&mut self, end_ns: u64) {
         let until_ns = end_ns - WAY_NS;
         let mut info = FrameInfo::default();
         match self.says {
             Says::Nothing => {}
             Says::Deadline => info.deadline_ns = until_ns,
-            // 0 would say nothing.
+            // 0 means that the frame sets no limit.
             Says::TimeLeft => {
                 let left_ns = until_ns.saturating_sub(SystemClock.monotonic_ns());
                 info.time_left_ns = left_ns.max(1);
@@ -217,17 +216,17 @@ impl Asker {
         }
         let rows = Rows::Poses(&self.rows);
         self.client.step(&info, rows, 60 * SECOND_NS).unwrap();
-        // Else the frame's word was not heard.
+        // A larger budget would mean that the daemon ignored the limit in the frame.
         let given_ns = self.client.view().tick().budget_ns;
         assert!(self.says == Says::Nothing || given_ns <= FRAME_NS);
     }
 
-    /// Adds what the result says.
+    /// Adds the values of the result.
     fn count(&self, tally: &mut Tally) {
         let view = self.client.view();
         let tick = view.tick();
         tally.tick_ns.push(tick.elapsed_ns);
-        // Of the tick before; in the mean of many frames that is the same.
+        // This is the rest of the tick before; the mean over many frames is the same.
         tally.rest_ns += tick.stage_ns[usize::from(Stage::Rest.code())];
         tally.overruns += u64::from(tick.overrun);
         tally.candidates += tick.candidates;
@@ -240,7 +239,7 @@ impl Asker {
     }
 }
 
-/// Looks at the clock until then: work, as far as the machine can tell.
+/// Busy-waits until `until_ns`, as a stand-in for work.
 fn work_until(until_ns: u64) {
     while SystemClock.monotonic_ns() < until_ns {
         std::hint::spin_loop();
@@ -257,7 +256,7 @@ fn sleep_until(until_ns: u64) {
     }
 }
 
-/// Frame after frame; `warm` is called before the first that counts.
+/// Plays the frames one after the other; calls `warm` before the first measured frame.
 fn play(mut asker: Option<&mut Asker>, frames: usize, mut warm: impl FnMut()) -> Tally {
     let clock = SystemClock;
     let (mut tally, mut random) = (Tally::default(), Random::new(SEED));
@@ -293,7 +292,7 @@ fn play(mut asker: Option<&mut Asker>, frames: usize, mut warm: impl FnMut()) ->
     tally
 }
 
-/// A quantile, milliseconds.
+/// A quantile as text, milliseconds.
 fn ms(times: &mut [u64], share: f64) -> String {
     format!("{:.2}", quantile(times, share) as f64 * 1e-6)
 }
@@ -302,7 +301,7 @@ fn percent(part: f64, whole: f64) -> f64 {
     100.0 * part / whole.max(1.0)
 }
 
-/// The columns from `case` on.
+/// The CSV columns from `case` on.
 fn line(case: &Case, mut tally: Tally, preempted: u64) -> String {
     let budget = match case.budget_ns {
         Some(ns) => format!("{:.1}", ns as f64 * 1e-6),

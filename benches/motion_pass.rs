@@ -1,5 +1,6 @@
-//! The narrow phase's motion pass costs in proportion to what moved: 300,000 candidate pairs (10,000 spheres, 60
-//! pairs a body); 0.5 % of the bodies move, which is 1 % of the pairs, or 1 %, 10 %, all of them.
+//! The cost of the narrow phase's motion pass is proportional to the number of pairs that moved: 300,000 candidate
+//! pairs (10,000 spheres, 60 pairs per body), of which 0.5 % of the bodies (1 % of the pairs), 1 %, 10 % or all bodies
+//! move.
 //!
 //! `cargo bench --bench motion_pass [-- --quick]`
 
@@ -14,7 +15,7 @@ use sweepd::builtin::Random;
 use sweepd::time::Budget;
 use sweepd::wire::{Demand, Stage};
 
-/// Spheres so dense that each box overlaps 60 others.
+/// Spheres at a density at which the box of each overlaps 60 others.
 fn dense(bodies: usize, seed: u64) -> String {
     let mut random = Random::new(seed);
     let side = (bodies as f64 / 8.8).cbrt();
@@ -56,7 +57,7 @@ fn main() {
         let moved = (bodies as f64 * percent / 100.0) as usize;
         let mut rows: Vec<_> = all[..moved].to_vec();
         for tick in 0..ticks {
-            // A tremble of a micrometre: verdicts hold, certificates are asked.
+            // Each body oscillates by a micrometre: verdicts stay valid, but their certificates must be checked.
             for row in &mut rows {
                 row.position[0] += if tick % 2 == 0 { 1e-6 } else { -1e-6 };
             }

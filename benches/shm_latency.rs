@@ -1,15 +1,17 @@
-//! What shared memory costs a lockstep client: from its send to its receipt of the result, beyond the tick's own time.
+//! The cost of shared memory for a lockstep client: time from sending a frame to receiving its result, minus the tick's
+//! time.
 //!
-//! * `sleep` - both sides go to sleep at once and are woken by an event each.
-//! * `event` - the default: both look for 50 us, then sleep; frames as fast as the results come.
-//! * `event_1khz` - the default with a frame a millisecond, so that the daemon has gone to sleep.
+//! * `sleep` - both sides sleep at once, and an event wakes each.
+//! * `event` - the default: both sides poll for 50 us, then sleep; each frame is sent as soon as the last result is
+//!   there.
+//! * `event_1khz` - the default with one frame per millisecond, so that the daemon is asleep when it comes.
 //! * `polling` - neither side ever sleeps.
-//! * `socket_echo` - two bare wake-ups of this machine, for comparison: a Unix datagram to another process and back.
+//! * `socket_echo` - two bare wake-ups on this machine, for comparison: a Unix datagram to another process and back.
 //!
-//! Method: a daemon without geometry in a process of its own (this program again) answers each frame with a tick and
-//! one pair a body; the tick says how long it took from wake-up to the outbox filled, which is taken off.
-//! `preempted` are the times that the scheduler took the core from client or daemon: a polling row in which it is not
-//! near 0 tells of who else wanted the cores.
+//! Method: a daemon without geometry in its own process (this program again) answers each frame with a tick and one
+//! pair per body. The tick reports the time from wake-up to the filled outbox, which is subtracted. `preempted` counts
+//! how often the scheduler preempted client or daemon: a polling row in which it is not near 0 measures other load on
+//! the cores.
 //!
 //! `cargo bench --bench shm_latency [-- FRAMES]`
 #![allow(
@@ -40,7 +42,7 @@ const FRAMES_DEFAULT: usize = 20_000;
 /// Frames before the measurement: connections, growth of slices, page faults.
 const FRAMES_WARM: usize = 500;
 
-/// How long both sides look before they sleep; `None`: the default.
+/// How long both sides poll before they sleep; `None`: the default.
 fn spin_ns(how: &str) -> Option<u64> {
     match how {
         "sleep" => Some(0),
@@ -49,7 +51,7 @@ fn spin_ns(how: &str) -> Option<u64> {
     }
 }
 
-/// A Unix datagram to another process and back: what two wake-ups cost on this machine.
+/// A Unix datagram to another process and back: the cost of two wake-ups on this machine.
 fn echo(frames: usize) -> String {
     let root = std::env::temp_dir().join(format!("swbench_echo_{}", std::process::id()));
     std::fs::create_dir_all(&root).unwrap();
@@ -73,7 +75,7 @@ fn echo(frames: usize) -> String {
     report("socket_echo", 0, &mut latencies_ns, switches - before)
 }
 
-/// The other side of [`echo`], until a 0 comes.
+/// The other side of [`echo`]; returns when it receives a 0.
 fn echo_back(own: &str, peer: &str) {
     let socket = UnixDatagram::bind(own).unwrap();
     println!("READY");
@@ -84,7 +86,7 @@ fn echo_back(own: &str, peer: &str) {
     }
 }
 
-/// The daemon's part: until its standard input ends.
+/// Runs the daemon until standard input ends.
 fn serve(root: &str, how: &str) {
     let clock = SystemClock;
     let mut options = ServerOptions {
@@ -100,7 +102,7 @@ fn serve(root: &str, how: &str) {
         let mut nothing = Vec::new();
         let _ended = std::io::stdin().read_to_end(&mut nothing);
         let root = std::env::args().nth(2).unwrap();
-        // the door is on the other thread: the mark is a file that it looks for
+        // The server is on another thread, so the request to stop is a file that it looks for.
         std::fs::write(format!("{root}/stop"), "").unwrap();
     });
     let (mut inbox, mut outbox) = (Inbox::default(), Outbox::default());

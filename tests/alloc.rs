@@ -1,8 +1,8 @@
-//! Goal: no allocation in a tick after warm-up at constant scene size; and memory that comes back when most bodies leave.
-//! Method: a counting allocator around the system's; a motion is played over and over, and one of its rounds must come
-//! without an allocation: a later one may still need more of something than any before. What the thread holds is counted
-//! at a crowd's peak, once few are left, and at the next peak.
-//! `SWEEPD_ALLOC_TRACE=1` prints where each of the last round was made.
+//! Goal: no allocation in a tick after warm-up at constant scene size; and memory is freed when most bodies leave.
+//! Method: an allocator that counts and forwards to the system's. A motion is repeated until one round makes no
+//! allocation, because a later round may still need more of some buffer than every earlier one. The bytes held by the
+//! thread are compared at the peak of a crowd, after most of it has left, and at the next peak.
+//! `SWEEPD_ALLOC_TRACE=1` prints a backtrace of each allocation of the last round.
 
 #![allow(unsafe_code, reason = "a counting allocator has no safe form")]
 #![allow(clippy::unwrap_used, reason = "a test")]
@@ -28,7 +28,7 @@ use sweepd::time::Budget;
 use sweepd::wire::{Demand, EndCause};
 use sweepd::world::{ChangeSet, Removed};
 
-/// Rounds of a motion of which one must come without an allocation: what the scene needs is there then.
+/// Most rounds of a motion. By then one must make no allocation, since all buffers have the size that the scene needs.
 const ROUNDS: u64 = 12;
 
 struct Counting;
@@ -37,13 +37,13 @@ thread_local! {
     static ARMED: Cell<bool> = const { Cell::new(false) };
     static TRACED: Cell<bool> = const { Cell::new(false) };
     static COUNT: Cell<u64> = const { Cell::new(0) };
-    /// Bytes that the thread has taken and not given back.
+    /// Bytes that the thread has allocated and not freed.
     static HELD: Cell<i64> = const { Cell::new(0) };
 }
 
 fn hold(more: usize, less: usize) {
     let sizes = [more, less].map(|size| i64::try_from(size).unwrap_or(i64::MAX));
-    // A thread that ends has no cell any more.
+    // While a thread ends its cell is already destroyed.
     let _gone = HELD.try_with(|held| held.set(held.get() + sizes[0] - sizes[1]));
 }
 
@@ -52,7 +52,7 @@ fn note() {
         if armed.get() {
             COUNT.with(|count| count.set(count.get() + 1));
             if TRACED.with(Cell::get) {
-                // What the trace itself needs does not count.
+                // Allocations of the trace itself are not counted.
                 armed.set(false);
                 eprintln!("{}", std::backtrace::Backtrace::force_capture());
                 armed.set(true);
@@ -61,26 +61,26 @@ fn note() {
     });
 }
 
-// SAFETY: every call goes to the system's allocator unchanged; counting touches thread-local cells that need no
-// memory of their own.
+// SAFETY: every call is forwarded to the system's allocator unchanged; counting uses thread-local cells that allocate
+// nothing.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         note();
         hold(layout.size(), 0);
-        // SAFETY: the caller's promise about `layout` is passed on.
+        // SAFETY: the caller guarantees that `layout` is valid.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
         hold(0, layout.size());
-        // SAFETY: `pointer` came from `alloc` above with this layout.
+        // SAFETY: `pointer` comes from `alloc` above with this layout.
         unsafe { System.dealloc(pointer, layout) }
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         note();
         hold(size, layout.size());
-        // SAFETY: as in `dealloc`, and the caller's promise about `size` is passed on.
+        // SAFETY: as in `dealloc`, and the caller guarantees that `size` is valid.
         unsafe { System.realloc(pointer, layout, size) }
     }
 }
@@ -88,8 +88,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Plays a motion's frames over and over, until a whole round comes without an allocation; returns how many the last
-/// round made.
+/// Repeats a motion until a whole round makes no allocation; returns the number of allocations of the last round.
 fn least(scene: &str, budget: Budget, ticks: u64) -> u64 {
     let traced = std::env::var_os("SWEEPD_ALLOC_TRACE").is_some();
     let mut drive = Drive::new(scene, Pattern::Wander, 3);
@@ -108,7 +107,7 @@ fn least(scene: &str, budget: Budget, ticks: u64) -> u64 {
     made
 }
 
-/// Tori and boxes in a heap: pairs of meshes, and of meshes with convex shapes, that come and go.
+/// Tori and boxes in a heap: mesh pairs and mesh-convex pairs that begin and end.
 fn tori(count: u32) -> String {
     let mut text = "[[source]]\nname = \"feed\"\n".to_owned();
     let torus = trimesh(&torus(0.3, 0.1, 16, 10), None);
@@ -124,7 +123,7 @@ fn tori(count: u32) -> String {
     text
 }
 
-/// Bodies of a torus and a box each, on a floor: pairs of several shapes, and of meshes with a half-space.
+/// Bodies of a torus and a box each, on a floor: pairs with several shapes, and of meshes with a half-space.
 fn compounds(count: u32) -> String {
     let mut text = "[[source]]\nname = \"feed\"\n".to_owned();
     text += "[[body]]\nname = \"floor\"\nmoves = false\n";
@@ -154,18 +153,18 @@ fn bending(count: u32) -> String {
     text
 }
 
-/// The same, with every body that moves swept.
+/// The same scene with every moving body swept.
 fn swept(scene: &str) -> String {
     scene.replace("moves = true\n", "moves = true\ncontinuous = true\n")
 }
 
-/// The same with a broad phase of this name.
+/// The same scene with the named broad phase.
 fn with_method(scene: &str, name: &str) -> String {
     let run = format!("\n[run]\nbroad_phase = \"{name}\"\n\n[[source]]");
     scene.replacen("\n[[source]]", &run, 1)
 }
 
-/// Boxes in rows of so many go round in circles, some of them into others.
+/// Boxes in rows of `row` move on circles, some of them into others.
 fn circle(boxes: &mut [Aabb], row: u32, tick: u32) {
     for (at, aabb) in (0_u32..).zip(boxes) {
         let angle = f64::from(at) + f64::from(tick) * 0.05;
@@ -205,8 +204,8 @@ fn a_search_shared_by_threads_allocates_nothing_in_the_tick_thread_after_warm_up
     assert_eq!(last, 0, "allocations in the last round");
 }
 
-/// Ticks of a crowd that comes, moves, leaves but for a few, comes again, and leaves wholly; bytes held in each of these
-/// times, without the caller's.
+/// Ticks of a crowd that comes, moves, leaves except for a few, comes again, and leaves completely. Returns the bytes
+/// held after each of these phases, without those of the caller's change lists.
 fn crowd(broad: &mut BroadPhase, many: u32, few: u32) -> [i64; 4] {
     let mut boxes = Boxes::new(many as usize);
     let (mut pairs, mut delta) = (PairSet::new(1 << 20), PairDelta::default());
@@ -255,7 +254,7 @@ fn bug_the_memory_of_a_crowd_comes_back_when_it_leaves() {
         broad.use_afresh(afresh);
         let [peak, few, again, none] = crowd(&mut broad, 40_000, 100);
         assert!(peak > 1_000_000, "{method:?} holds {peak} bytes");
-        // Pairs keep their slots, be they high.
+        // Pairs keep their slots, even high ones, so their memory shrinks only partly.
         assert!(few * 8 < peak, "{method:?} holds {few} bytes of {peak}");
         assert!(again < peak * 2, "{method:?}: {again} bytes after {peak}");
         assert!(none * 40 < peak, "{method:?} holds {none} bytes for nobody");
@@ -284,7 +283,7 @@ fn bug_the_memory_of_a_crowds_pairs_came_back_with_no_later_tick() {
     let before = run(3, 5.0);
     let crowd = run(3, 0.0) - before;
     assert!(crowd > 5_000_000, "{bodies} bodies take {crowd} bytes");
-    // Kept while it may come again.
+    // Memory is kept for a while, in case the crowd comes again.
     let kept = run(500, 5.0) - before;
     assert!(2 * kept > crowd, "{kept} of {crowd} bytes");
     run(3, 0.0);
@@ -294,8 +293,8 @@ fn bug_the_memory_of_a_crowds_pairs_came_back_with_no_later_tick() {
     assert!(again < 2 * crowd, "{again} after {crowd} bytes");
 }
 
-/// Fails where a tick of a scene allocates, without a budget and, where `limited`, within small ones. Builds with debug
-/// assertions leave these out: they are slow, and allocate alike.
+/// Fails if a tick of a scene allocates: without a budget and, if `limited`, with small budgets. Builds with debug
+/// assertions omit the small budgets: they are slow, and allocate in the same places.
 fn check(name: &str, scene: &str, limited: bool) {
     let budgets = [
         Budget::UNLIMITED,
@@ -337,8 +336,9 @@ fn a_tick_of_meshes_allocates_nothing_after_warm_up() {
     check("tori", &tori(30), true);
     check("compounds", &compounds(20), true);
     check("bending", &bending(18), true);
-    // Where work on meshes is cut off, how much of it is under way creeps up for long, as turns go round all pairs
-    // (tori within 50 units: 900 ticks), and for too long when pairs come and go as fast as those of swept boxes do.
+    // Swept meshes are checked without a budget only. With one, unfinished work on meshes grows for a long time while
+    // turns rotate through all pairs (tori within 50 units: 900 ticks), and for too long if pairs begin and end as fast
+    // as those of swept boxes.
     check("swept tori", &swept(&tori(9)), false);
     check("swept compounds", &swept(&compounds(6)), false);
 }

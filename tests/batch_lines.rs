@@ -1,6 +1,6 @@
-//! `query --batch` and the exact queries on bad input, and on the pairs that the library beneath got wrong.
+//! `query --batch` and the exact queries on bad input, and on pairs for which parry's results are wrong.
 //!
-//! The failures listed here were measured on parry3d-f64 0.31.1 `contact`; each has a closed truth.
+//! The failures listed here were measured on parry3d-f64 0.31.1 `contact`; each has a closed-form truth.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -280,7 +280,7 @@ fn bug_what_is_too_far_to_compute_with_is_refused_by_id_and_no_answer() {
         );
     }
     assert_eq!(answers[0]["id"], "balls");
-    // As far as squares of it are numbers, it is answered.
+    // A distance whose square is finite has an answer.
     assert_eq!(answers[4]["gap_m"], 1e150);
 }
 
@@ -349,7 +349,7 @@ fn bug_what_is_too_small_for_its_squares_is_refused_or_allowed_for() {
         let error = answer["error"].as_str().unwrap();
         assert!(error.contains("a: the extent of the "), "{error}");
     }
-    // Nothing but a place, and a small triangle within a mesh that is large.
+    // A single point, and a tiny triangle within a large mesh: the extent is not an error here.
     let place = json!({"type": "convex", "vertices": [[0.0, 0.0, 0.0]]});
     let mesh = json!({
         "type": "trimesh",
@@ -404,7 +404,8 @@ fn what_is_wrong_in_a_line_is_told_with_the_part_it_stands_in() {
     assert!(listed.starts_with("line 1: it is no object"), "{listed}");
 }
 
-/// How far apart is from exact rational arithmetic: what rounding takes for an overlap was told nearer than it is.
+/// The true distance is from exact rational arithmetic. Where rounding suggests an overlap, the reported gap was
+/// smaller than the true one.
 #[test]
 fn bug_a_sliver_that_is_just_apart_was_told_nearer_than_it_is() {
     let sliver = json!({"type": "triangle", "vertices": [
@@ -426,7 +427,7 @@ fn bug_a_sliver_that_is_just_apart_was_told_nearer_than_it_is() {
     );
 }
 
-/// A cube of half side `h`, closed, outward.
+/// A closed cube of half side `h`, with outward faces.
 fn cube(h: f64, solid: Option<bool>) -> Value {
     let corners: Vec<[f64; 3]> = (0..8)
         .map(|k| [4, 2, 1].map(|bit| if k & bit == 0 { -h } else { h }))
@@ -452,7 +453,7 @@ fn cube(h: f64, solid: Option<bool>) -> Value {
     mesh
 }
 
-/// What a daemon tells of the same two shapes, of meshes as their `solid` says.
+/// The result of a daemon for the same two shapes; meshes are solids or surfaces according to their `solid`.
 fn as_in_a_daemon(a: &Value, b: &Value, t: [f64; 3]) -> (f64, f64, bool) {
     let body = |shape: &Value, at: [f64; 3]| {
         let spec: ShapeSpec = serde_json::from_value(shape.clone()).unwrap();
@@ -474,7 +475,7 @@ fn as_in_a_daemon(a: &Value, b: &Value, t: [f64; 3]) -> (f64, f64, bool) {
     )
 }
 
-/// It was proved apart by the distance to the surface.
+/// The pair was proved apart by the distance to the surface.
 #[test]
 fn bug_what_is_inside_a_solid_mesh_collides_with_it() {
     let others = [
@@ -502,13 +503,13 @@ fn bug_what_is_inside_a_solid_mesh_collides_with_it() {
                 } else {
                     assert!(low <= gap && gap <= high && high - low < 1e-9, "{what}");
                 }
-                // What says nothing is a surface here; a daemon would settle it by its topology.
+                // Without `solid` a mesh is a surface here; a daemon would decide by its topology.
                 if other["solid"].is_null() && other["type"] == "trimesh" {
                     continue;
                 }
                 assert_eq!(as_in_a_daemon(a, b, t), (low, high, gap < 0.0), "{what}");
             }
-            // A surface has no inside.
+            // A surface has no interior.
             for surface in [cube(1.0, None), cube(1.0, Some(false))] {
                 if other["solid"] == true {
                     continue;
@@ -524,7 +525,7 @@ fn bug_what_is_inside_a_solid_mesh_collides_with_it() {
             }
         }
     }
-    // Half-spaces too; and what is not closed is no solid.
+    // Half-spaces collide with solids too; and a mesh that is not closed cannot be a solid.
     let floor = json!({"type": "half_space", "normal": [0, 0, 1], "offset": -3.0});
     let (_, told) = ask(line("x", &floor, &cube(1.0, Some(true)), [0.0, 0.0, 0.5]).as_bytes());
     assert!(
@@ -542,7 +543,7 @@ fn bug_what_is_inside_a_solid_mesh_collides_with_it() {
     );
 }
 
-/// The engine of a daemon, which answers them, never sees such places, and is not made for them.
+/// The engine of a daemon, whose code answers these queries, never gets such positions and is not designed for them.
 #[test]
 fn solids_that_are_too_far_to_compute_with_are_told_as_such() {
     let others = [

@@ -1,5 +1,5 @@
-//! Goal: the command line as a user and a script meet it: codes, streams, closed pipes, texts. Method: the real
-//! binary as a child; daemons on instances of their own.
+//! Goal: the command line as users and scripts see it: exit codes, streams, closed pipes, texts. Method: the real
+//! binary as a child; daemons with separate instances.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -47,7 +47,7 @@ fn err(output: &Output) -> String {
     String::from_utf8(output.stderr.clone()).unwrap()
 }
 
-/// Starts the binary, reads so many lines, closes the pipe, waits for the end.
+/// Starts the binary, reads this many lines, closes the pipe and waits for the end.
 fn head(args: &[&str], lines: usize) -> Output {
     let mut child = sweepd()
         .args(args)
@@ -206,7 +206,7 @@ fn a_scene_that_is_missing_or_wrong_is_code_2_with_its_place() {
     let ended = output(&["run", scene.to_str().unwrap(), "--mode", "on_frame=ghost"]);
     assert_eq!(code(&ended), Some(2));
     assert!(err(&ended).contains("ghost"), "{}", err(&ended));
-    // No message of such a source is a whole frame.
+    // No message of a source of ROS 2 topics is a whole frame, which lockstep needs.
     let of_topics = TWO_SPHERES
         .replace("on_frame = \"sim\"", "rate = 100")
         .replace("timeout_ms = 3000", "ros2 = { type = \"tf\" }");

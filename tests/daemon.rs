@@ -1,5 +1,5 @@
-//! Goal: the daemon as a client meets it, over shared memory between processes. Method: the real binary as a child,
-//! the Rust client in this process; whatever else runs on the machine, nothing here asserts a short time.
+//! Goal: the daemon as a client sees it, over shared memory between processes. Method: the real binary as a child, the
+//! Rust client in this process. The few limits on durations are wide, because other load may slow the machine.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,

@@ -1,5 +1,5 @@
-//! Goal: the daemon's loop keeps the law of time. Method: daemon, door and client in this process and on one thread,
-//! rounds run one by one, and a clock turned by hand.
+//! Goal: the daemon's loop keeps the rules of time. Method: daemon, door and client in this process on one thread,
+//! rounds run one by one, with a manual clock.
 #![allow(
     clippy::unwrap_used,
     clippy::cast_precision_loss,
@@ -23,7 +23,7 @@ const HEARTBEAT_NS: u64 = 100 * MS;
 const TIMEOUT_NS: u64 = 5_000 * MS;
 const MODES: [&str; 3] = ["on_frame = \"sim\"", "mode = \"on_all\"", "rate = 20"];
 
-/// Balls of radius 1 m of source `sim`.
+/// Balls of radius 1 m with source `sim`.
 fn scene(run: &str, balls: usize) -> Scene {
     let mut text = format!(
         "[run]\n{run}\n[[source]]\nname = \"sim\"\ntimeout_ms = {}\n",
@@ -38,7 +38,7 @@ fn scene(run: &str, balls: usize) -> Scene {
     Scene::parse(&text, "scene.toml", Path::new(".")).unwrap()
 }
 
-/// Pairs of balls far from one another; `apart` of their centres, on both of two axes.
+/// Poses of pairs of balls, each pair far from the others; the centres of a pair differ by `apart` on two axes.
 fn pairs(balls: usize, apart: f64) -> Vec<TransformRow> {
     let row = |at: usize| TransformRow {
         body: at as u64 + 1,
@@ -56,7 +56,7 @@ fn pairs(balls: usize, apart: f64) -> Vec<TransformRow> {
 const TOUCHING: f64 = 1.2;
 const APART: f64 = 1.5;
 
-/// A client that hears each tick.
+/// A client that receives each tick.
 struct Ear {
     client: Client,
 }
@@ -79,7 +79,7 @@ impl Ear {
         self.client.send(&info, Rows::Poses(rows)).unwrap();
     }
 
-    /// The ticks that have come since, each with whether its pairs came with it.
+    /// The ticks received since the last call, each with whether the view has pairs.
     fn heard(&mut self) -> Vec<(TickRow, bool)> {
         let mut heard = Vec::new();
         while self.client.wait_tick(0).unwrap() == Heard::Tick {
@@ -108,7 +108,7 @@ fn law_4_4_while_a_tick_takes_longer_than_a_heartbeat_clients_hear_that_it_is_un
     let first = ear.heard();
     assert_eq!(first.len(), 1, "it took no time");
     ear.send(&pairs(BALLS, TOUCHING));
-    // Each look at the clock takes a millisecond: some 400 queries.
+    // Each read of the clock takes a millisecond, so a tick of about 400 queries is long.
     clock.step_each_read(MS);
     let start_ns = clock.monotonic_ns();
     daemon.round(None).unwrap();
@@ -121,7 +121,8 @@ fn law_4_4_while_a_tick_takes_longer_than_a_heartbeat_clients_hear_that_it_is_un
         assert_eq!(state(tick), State::Unknown);
         assert_eq!(tick.reasons, Reason::Undecided.bit());
         assert!(tick.sent_ns - before_ns <= HEARTBEAT_NS + 30 * MS);
-        // All is read after the tick: its pairs are there already, and come with its end alone.
+        // The test reads all messages after the tick: the pairs are already there, but belong to its end, not to this
+        // message.
         assert!(!*with_pairs);
         assert_eq!(tick.header.tick, last.0.header.tick);
         assert_eq!(tick.sources_len, 0);
@@ -144,7 +145,7 @@ fn law_4_4_in_lockstep_a_heartbeat_judges_ages_and_spends_no_units() {
         let mut daemon = Daemon::new(&scene, shapes, 7, clock.clone(), &mut door).unwrap();
         let mut ear = Ear::of(&hub, &clock);
         ear.send(&pairs(BALLS, TOUCHING));
-        // No time is left for any pair, or for three of them.
+        // The time is used up before the first pair, or the units after three pairs.
         clock.step_each_read(if budget.contains("units") {
             0
         } else {
@@ -164,14 +165,14 @@ fn law_4_4_in_lockstep_a_heartbeat_judges_ages_and_spends_no_units() {
             assert_eq!((beat.units, beat.possible), (0, open), "{budget}");
             assert_eq!(beat.budget_units, 0);
         }
-        // Of old data nothing is decided, and that it is old is told.
+        // Stale data decides nothing, and its age is reported.
         clock.advance(TIMEOUT_NS);
         daemon.round(None).unwrap();
         let (late, _) = ear.heard().pop().unwrap();
         assert_eq!((late.units, late.unknown), (0, BALLS as u64));
         assert_eq!(state(&late), State::Unknown);
         assert_ne!(late.reasons & Reason::Stale.bit(), 0);
-        // The next frame has its units again.
+        // The next frame has units again.
         ear.send(&pairs(BALLS, TOUCHING));
         daemon.round(None).unwrap();
         let (frame, _) = ear.heard().pop().unwrap();
@@ -211,7 +212,7 @@ fn bug_in_lockstep_a_frame_behind_one_whose_wait_ends_had_no_units() {
     assert_eq!((tick.possible, tick.colliding), (0, BALLS as u64 / 2));
 }
 
-/// A way is asked for in the tick that it ends in, or never.
+/// A swept pair is checked in the tick in which its motion ends, or never.
 #[test]
 fn bug_in_lockstep_the_way_of_a_body_of_another_source_whose_frame_had_waited_had_no_units() {
     let (hub, clock) = (Hub::new(), Arc::new(ManualClock::new(1_000 * MS)));
@@ -251,7 +252,7 @@ fn bug_in_lockstep_the_way_of_a_body_of_another_source_whose_frame_had_waited_ha
     clock.advance(TIMEOUT_NS / 2);
     let waits = shoot(&mut daemon, &mut ear, 0, 60.0);
     assert_eq!(state(&waits), State::Clear);
-    // The wait of the one before it ends between two frames of the lead.
+    // The waiting frame before it times out between two frames of the source that leads.
     clock.advance(TIMEOUT_NS / 2);
     daemon.round(None).unwrap();
     let (tick, _) = ear.heard().pop().unwrap();
@@ -289,7 +290,7 @@ fn bug_in_lockstep_frames_that_waited_together_were_used_up_in_one_tick_and_not_
     daemon.round(None).unwrap();
     let (tick, _) = ear.heard().pop().unwrap();
     assert_eq!((tick.sources[0].seq, tick.colliding), (4, 0));
-    // The third was touching, and no tick was of it: the next one says so.
+    // The third frame had a contact, and no tick used it: the next tick counts it as skipped.
     clock.advance(HEARTBEAT_NS);
     daemon.round(None).unwrap();
     let (tick, _) = ear.heard().pop().unwrap();
@@ -315,7 +316,7 @@ fn law_3_8_a_machine_that_was_suspended_wakes_to_a_tick_that_says_its_data_is_ol
             word = ear.heard().pop().map(|(tick, _)| state(&tick)).or(word);
         }
         assert_eq!(word, Some(State::Clear), "{mode}");
-        // CLOCK_BOOTTIME has run on meanwhile.
+        // CLOCK_BOOTTIME advances while the machine is suspended.
         clock.advance(HOUR_NS);
         daemon.round(None).unwrap();
         let heard = ear.heard();
@@ -324,7 +325,7 @@ fn law_3_8_a_machine_that_was_suspended_wakes_to_a_tick_that_says_its_data_is_ol
         };
         assert_eq!((state(tick), tick.unknown), (State::Unknown, 2), "{mode}");
         assert_ne!(tick.reasons & Reason::Stale.bit(), 0, "{mode}");
-        // What was sent before it slept, and is only received now, makes nothing known either.
+        // A frame that was sent before the suspension and is received after it makes no body known either.
         clock.advance(10 * MS);
         ear.send(&far);
         clock.advance(HOUR_NS);
@@ -335,7 +336,7 @@ fn law_3_8_a_machine_that_was_suspended_wakes_to_a_tick_that_says_its_data_is_ol
             }
             clock.advance(HEARTBEAT_NS);
         }
-        // A fresh frame does.
+        // A new frame makes the bodies known.
         ear.send(&far);
         clock.advance(50 * MS);
         daemon.round(None).unwrap();

@@ -1,5 +1,5 @@
-//! Goal: the engine as a whole gives sound answers. Method: built-in scenes moved by built-in motions, each tick's
-//! published pairs against exact queries of every pair of bodies.
+//! Goal: the whole engine gives sound answers. Method: built-in scenes with built-in motions; the pairs published in
+//! each tick are compared with exact queries of every pair of bodies.
 
 #![allow(
     clippy::cast_possible_truncation,
@@ -19,7 +19,7 @@ use sweepd::builtin::{Pattern, pile, pool};
 use sweepd::time::Budget;
 use sweepd::wire::{BroadCause, BroadMode, Demand, PairRow, State, Verdict};
 
-/// Every pair of bodies by brute force against what was published; returns (colliding, possible).
+/// Compares every pair of bodies, by brute force, with the published pairs; returns the counts (colliding, possible).
 fn compare(drive: &Drive) -> (usize, usize) {
     let out = drive.out();
     let engine = drive.engine();
@@ -159,7 +159,7 @@ fn the_tick_tells_how_the_broad_phase_worked_and_why() {
     drive.step(0, Budget::UNLIMITED, Demand::ALL);
     let first = (BroadMode::Sort, BroadCause::ManyCame, 300);
     assert_eq!(told(&drive), first, "all of a new scene are sorted");
-    // All move, and then none does.
+    // All bodies move; after that none does.
     drive.step(1, Budget::UNLIMITED, Demand::ALL);
     let (mode, cause, _) = told(&drive);
     assert_eq!((mode, cause), (BroadMode::List, BroadCause::ManyMoved));
@@ -180,7 +180,7 @@ fn the_tick_tells_how_the_broad_phase_worked_and_why() {
     assert_eq!(told(&few), (BroadMode::Whole, BroadCause::None, 0));
 }
 
-/// A place on the line that bodies are spread along, or the one where all are at first.
+/// Places a body on the x axis of the test; at first all bodies are at one place, later they are spread out.
 fn place(drive: &mut Drive, at: usize, x_m: f64) {
     drive.rows_mut()[at].position = [x_m, 0.0, 5.0];
 }
@@ -197,7 +197,7 @@ fn bug_after_a_crowd_every_tick_walked_by_the_places_of_all_its_pairs() {
     (0..bodies).for_each(|at| place(&mut drive, at, 0.0));
     let out = drive.send(Budget::units(50), demand);
     assert!(out.tick.candidates > 5_000, "{bodies} bodies");
-    // The two whose pair stands last go on together, then apart and together again, while all move.
+    // The two bodies of the last pair stay together, then separate and meet again, while all bodies move.
     let last = [bodies - 2, bodies - 1].map(|at| drive.rows_mut()[at].body);
     for tick in 0..12 {
         for at in 0..bodies - 1 {

@@ -1,9 +1,10 @@
-//! Random convex pairs against an oracle that shares no code with the queries: support functions written again from
-//! the shapes' definitions, directions sampled densely and climbed by pattern search.
+//! Random convex pairs against an oracle that shares no code with the queries: support functions derived independently
+//! from the shapes' definitions, directions sampled densely and improved by pattern search.
 //!
-//! For every unit `n`, `f(n) = -(s_A(n) + s_B(-n))` is at most the gap, so one direction with `f` above `gap.max` shows
-//! an unsound upper end. Sampled points of the shapes show an unsound lower end. How far to trust it: the climb can
-//! miss the best direction, so it proves intervals wrong, never right; widths are asserted as well.
+//! For every unit `n`, `f(n) = -(s_A(n) + s_B(-n))` is at most the gap, so a direction with `f` above `gap.max` proves
+//! the upper end unsound. The lower end must not exceed `f` of the normal and of every direction found; the closest
+//! points must lie in their shapes. Limit of the method: the search can miss the best direction, so it proves intervals
+//! wrong, never right; widths are asserted as well.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -68,7 +69,7 @@ impl Random {
     }
 }
 
-/// A shape as the oracle sees it.
+/// A shape as the oracle represents it.
 #[derive(Clone, Debug)]
 enum Solid {
     Sphere(f64),
@@ -96,7 +97,7 @@ impl Solid {
         }
     }
 
-    /// Support value along unit `n`, from the definition.
+    /// Support value along unit `n`, from the definition of the shape.
     fn reach(&self, n: &Vec3) -> f64 {
         let off = n.x.hypot(n.y);
         match self {
@@ -137,7 +138,7 @@ impl Solid {
         }
     }
 
-    /// A random one, sizes 0.2 to 1.
+    /// A random shape of size 0.2 to 1.
     fn random(r: &mut Random) -> Self {
         let kind = r.below(7);
         let mut s = || r.range(0.2, 1.0);
@@ -163,7 +164,7 @@ impl Solid {
         }
     }
 
-    /// One extent much smaller than the others.
+    /// A shape with an extent much smaller than another.
     fn thin(r: &mut Random) -> Self {
         let flat = 10.0_f64.powf(r.range(-6.0, -2.0));
         let s = r.range(0.2, 1.0);
@@ -182,13 +183,13 @@ impl Solid {
     }
 }
 
-/// `f(n)` in A's frame.
+/// `f(n)`, with `n` in A's frame.
 fn f(a: &Solid, b: &Solid, pos12: &Pose, n: &Vec3) -> f64 {
     let in_b = pos12.rotation.inverse_transform_vector(&-n);
     n.dot(&pos12.translation.vector) - a.reach(n) - b.reach(&in_b)
 }
 
-/// The greatest `f` that sampling and climbing finds.
+/// The greatest `f` that sampling and pattern search find, and its direction.
 fn greatest(a: &Solid, b: &Solid, pos12: &Pose, hint: &Vec3, samples: u32) -> (f64, Vec3) {
     let mut tops: Vec<(f64, Vec3)> = (0..samples)
         .map(|k| {
@@ -236,7 +237,7 @@ fn greatest(a: &Solid, b: &Solid, pos12: &Pose, hint: &Vec3, samples: u32) -> (f
     tops.into_iter().max_by(|x, y| x.0.total_cmp(&y.0)).unwrap()
 }
 
-/// A pair of one category with a gap near `target`.
+/// A pose of B at which the gap is near `target`.
 fn place(r: &mut Random, a: &Solid, b: &Solid, rotation: Quat, target: f64) -> Pose {
     let (ca, cb) = (a.build(), b.build());
     let mut at = r.direction() * (a.size() + b.size()) * r.range(0.0, 1.2);
@@ -253,7 +254,7 @@ const CATEGORIES: [&str; 12] = [
     "flat", "coaxial",
 ];
 
-/// Solids of revolution, the axis of one within the other: offset and lean from nothing to a third of the size.
+/// Two solids of revolution, the axis of one inside the other: offset and tilt from zero to a third of the size.
 fn coaxial(r: &mut Random) -> (Solid, Solid, Pose) {
     let shape = |r: &mut Random| {
         let (x, y) = (r.range(0.05, 1.0), r.range(0.05, 1.0));
@@ -357,7 +358,7 @@ struct Row {
     asymmetric: f64,
 }
 
-/// Checks one answer; returns its width in parts of the size, and whether the oracle contradicts it.
+/// Checks one answer; returns its width relative to the size, and the contradiction that the oracle found.
 fn check(a: &Solid, b: &Solid, pose: &Pose, c: &Closest, samples: u32) -> (f64, Option<String>) {
     let size = a.size().max(b.size());
     let width = c.gap.width() / size;
@@ -371,7 +372,7 @@ fn check(a: &Solid, b: &Solid, pose: &Pose, c: &Closest, samples: u32) -> (f64, 
             Some(format!("f({n:?}) = {top:e} above {:e}", c.gap.max)),
         );
     }
-    // The lower end is claimed by the normal itself.
+    // The lower end must be supported by the answer's own normal.
     let own = f(a, b, pose, &c.normal);
     if c.gap.min > own.max(top) + noise {
         return (
@@ -379,7 +380,7 @@ fn check(a: &Solid, b: &Solid, pose: &Pose, c: &Closest, samples: u32) -> (f64, 
             Some(format!("gap.min {:e} above every f {top:e}", c.gap.min)),
         );
     }
-    // Both points lie in their shapes: below every support plane.
+    // Both points must lie in their shapes, below every support plane.
     let within = 1e-6 * (size + pose.translation.vector.norm());
     for k in 0..64 {
         let (x, y) = (f64::from(k) * 2.4, f64::from(k) / 32.0 - 1.0 + 1.0 / 64.0);
@@ -477,7 +478,7 @@ fn no_direction_contradicts_an_interval_and_intervals_are_narrow() {
     }
 }
 
-/// Two shapes that graze: gaps from -1e-2 to 1e-2 of the size, half of them lying along axes.
+/// Two grazing shapes: gaps from -1e-2 to 1e-2, half of the pairs aligned with axes or nearly so.
 fn grazing(r: &mut Random) -> (Solid, Solid, Pose) {
     let shape = |r: &mut Random| loop {
         let solid = Solid::random(r);
@@ -507,7 +508,8 @@ fn grazing(r: &mut Random) -> (Solid, Solid, Pose) {
     (a, b, pose)
 }
 
-/// Answers of `count` grazing pairs, cold and warm along a small motion, that are not finished.
+/// Counts the answers to `count` grazing pairs, each cold and warm along a small motion, that are unfinished or
+/// contradict each other.
 fn unfinished(seed: u64, count: usize) -> usize {
     let mut r = Random(seed);
     let mut bad = 0;
@@ -540,8 +542,8 @@ fn grazing_pairs_are_finished_cold_and_warm_and_both_agree() {
     assert_eq!(unfinished(3, 1500), 0);
 }
 
-/// Pairs of every category that move by thousandths of their size: an answer that begins from the one before is as
-/// sound as one that begins from nothing, and no wider than it may be.
+/// Pairs of every category that move by thousandths of their size: a warm answer must be as sound as a cold one, and
+/// within the same limit of width.
 #[test]
 fn answers_along_a_motion_are_sound_and_agree_with_those_from_nothing() {
     let mut r = Random(41);
@@ -593,8 +595,8 @@ fn a_large_sweep() {
     assert!(rows.values().all(|row| row.unsound == 0));
 }
 
-/// A shape whose reach along the axes of the world is a short decimal, at a turn by a multiple of 90 degrees, and that
-/// reach.
+/// A shape whose extents along the world axes are short decimals, a rotation that maps axes to axes, and the rotated
+/// extents.
 fn upright(r: &mut Random) -> (Solid, Quat, Vec3) {
     let lengths = [0.05, 0.1, 0.2, 0.25, 0.3, 0.5, 1.0, 2.0];
     let mut length = || lengths[r.below(8) as usize];
@@ -615,7 +617,8 @@ fn upright(r: &mut Random) -> (Solid, Quat, Vec3) {
         Solid::Cylinder(r, h) | Solid::Cone(r, h) => Vec3::new(*r, *r, *h),
         _ => half,
     };
-    // Quarter turns about axes, and thirds about diagonals: entries of the matrix are 0 and 1 but for rounding.
+    // Quarter turns about axes and third turns about diagonals: the entries of the matrices are 0 and 1 except for
+    // rounding.
     let turns = [
         [1., 0., 0., 0.],
         [1., 0., 0., 1.],
@@ -636,7 +639,7 @@ fn upright(r: &mut Random) -> (Solid, Quat, Vec3) {
     (solid, turn, reach)
 }
 
-/// What stands on a table, to the last bit of a decimal, is the commonest touch of all.
+/// Bodies that stand on a table, in contact exactly to the last bit of a decimal, are the most common contact.
 #[test]
 fn bug_what_touched_to_the_last_bit_was_left_undecided() {
     let mut r = Random(17);
@@ -653,7 +656,7 @@ fn bug_what_touched_to_the_last_bit_was_left_undecided() {
         assert!(c.finished, "{what}");
         let (_, wrong) = check(&a, &b, &pose, &c, 12);
         assert_eq!(wrong, None, "{what}");
-        // The axis proves that they are not deeper; where cones or round sides meet they may be apart.
+        // The axis proves that the overlap is no deeper; cones and round sides may be apart along other directions.
         let size = a.size() + b.size();
         assert!(c.gap.max >= -1e-12 * size, "{what}");
         let flat = |of: &Solid| matches!(of, Solid::Cuboid(_) | Solid::Points(_));
@@ -732,7 +735,7 @@ fn bug_closest_points_on_parallel_features_lay_outside_their_shapes() {
     }
 }
 
-/// As boxes and as hulls of their corners.
+/// Boxes and the hulls of their corners must agree.
 #[test]
 fn bug_overlapping_boxes_nearly_in_line_had_an_interval_ten_times_too_wide() {
     let corners = |half: &Vec3| {
@@ -751,7 +754,7 @@ fn bug_overlapping_boxes_nearly_in_line_had_an_interval_ten_times_too_wide() {
         };
         let mut at = Vec3::new(0.1, 0.05, 0.65);
         if number % 3 > 0 {
-            // Rather two edges than two faces.
+            // In these cases two edges are closest, not two faces.
             let depth = r.range(1e-9, 0.1);
             at = Vec3::new(
                 r.range(-0.3, 0.3),
@@ -773,8 +776,8 @@ fn bug_overlapping_boxes_nearly_in_line_had_an_interval_ten_times_too_wide() {
     }
 }
 
-/// A small curved shape before a large one, apart by a known gap that is a millionth of the size or less: along a
-/// direction that is across a face or side of the large one, or nearly, or any.
+/// A small curved shape close to a large one, at a known gap of a millionth of the large one's size or less. The
+/// direction of the gap is perpendicular to a face or side of the large shape, nearly so, or arbitrary.
 fn before_large(r: &mut Random) -> (Solid, Solid, Pose, f64) {
     let curved = |r: &mut Random, size: f64| match r.below(3) {
         0 => Solid::Capsule(size * r.range(0.1, 1.0), size),
@@ -805,7 +808,7 @@ fn before_large(r: &mut Random) -> (Solid, Solid, Pose, f64) {
     let on_small = rotation * b.support(&inward).coords;
     let at = on_large + normal * gap_m - on_small;
     let pose = Pose::from_parts(at.into(), rotation);
-    // The plane across the direction is as far from both as the two points are from each other.
+    // Both shapes have this support plane, so the gap equals the distance of the two support points.
     let apart_m = f(&large, &small, &pose, &normal);
     assert!(
         (apart_m - gap_m).abs() < 1e-12,

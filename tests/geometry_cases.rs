@@ -1,6 +1,6 @@
-//! Scores the public narrow-phase cases through `sweepd query --batch`, by the rules they came with.
+//! Scores the public narrow-phase cases through `sweepd query --batch`, by the rules published with them.
 //!
-//! Truth: 50-digit arithmetic with certified bounds. Checked: sign, error by class, angle, interval and width.
+//! Truth: 50-digit arithmetic with certified bounds. Checked: sign, error per class, angle, interval and width.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -27,7 +27,7 @@ fn vector(v: &Value) -> [f64; 3] {
     [0, 1, 2].map(|k| v[k].as_f64().unwrap())
 }
 
-/// What was measured of one class.
+/// Measurements of one class.
 #[derive(Default)]
 struct Class {
     errors: Vec<f64>,

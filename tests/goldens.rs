@@ -1,16 +1,16 @@
-//! Goal: what is published of the built-in scenes changes on purpose only, and is the same in every build on every
-//! machine.
-//! Method: each built-in scene with each built-in motion, some ticks without a budget and with one of work units; what
-//! was published is made into a line and compared with that in `tests/data/goldens.txt`.
+//! Goal: the published results of the built-in scenes change only on purpose, and are the same in every build on every
+//! machine. Method: each built-in scene with each built-in motion, for some ticks without a budget and with one in work
+//! units. The published results are summed up in a line, which is compared with that in `tests/data/goldens.txt`.
 //!
-//! A line has two hashes, of the integers of all pairs (ids, verdicts, events, ticks, levels, flags) and of all
-//! contacts (ids, shapes, kinds, flags), and the means of all gaps, and of all contact points and normals. Bits of
-//! floats are in no hash: `sin`, `cos` and `atan2`, which the exact queries of cylinders and cones ask, are the C
-//! library's, and differ in their last digit from one library to the next, and in one library between processors with
-//! and without fused multiplication. For the same reason poses are rounded to a micrometre before they are sent. So
-//! the means are compared to within [`CLOSE`].
+//! A line has two hashes, one of the integers of all pairs (ids, verdicts, events, ticks, levels, flags) and one of
+//! those of all contacts (ids, shapes, kinds, flags), and the means of all gaps, and of all contact points and normals.
+//! Float bits are not hashed: `sin`, `cos` and `atan2`, which the exact queries of cylinders and cones use, come from
+//! the C library. Their last digit differs between libraries, and within one library between processors with and
+//! without fused multiply-add. For the same reason poses are rounded to a micrometre before they are sent. The means
+//! are compared to within [`CLOSE`].
 //!
-//! To renew the file on purpose: `SWEEPD_GOLDENS=renew cargo test --test goldens`, and commit it with what changed it.
+//! To renew the file on purpose: `SWEEPD_GOLDENS=renew cargo test --test goldens`, and commit it with the cause of the
+//! change.
 
 #![allow(clippy::unwrap_used, clippy::panic, unreachable_pub, reason = "a test")]
 
@@ -24,16 +24,17 @@ use sweepd::builtin::{Pattern, pile, pool};
 use sweepd::time::Budget;
 use sweepd::wire::{ContactRow, Demand, Outbox, PairRow};
 
-/// Moving bodies of a scene.
+/// Moving bodies per scene.
 const BODIES: usize = 200;
-/// Ticks that a scene is run for.
+/// Ticks per scene.
 const TICKS: u64 = 50;
-/// Work units of a tick where they are limited: too few for a scene that moves, so that ticks are cut off.
+/// Work units of a limited tick: too few for a moving scene, so that ticks are cut off.
 const UNITS: u64 = 12;
-/// Pairs nearer than this are told as near, metres.
+/// Pairs nearer than this are reported as near, metres.
 const NEAR: &str = "moves = true\nreport_within_m = 0.1\n";
-/// Mean gaps, points and normals are equal to within this, metres: of some thousand values, of which the last digits of
-/// trigonometry move most by nearly nothing, and an end of a curved pair that overlaps now and then by 1e-7.
+/// Tolerance of mean gaps, points and normals, metres. They are means of some thousand values; the last digits of
+/// trigonometric functions change most of these by almost nothing, and one end of an overlapping curved pair
+/// occasionally by 1e-7.
 const CLOSE: f64 = 1e-8;
 const WORDS: usize = 7;
 
@@ -52,7 +53,7 @@ impl Hash {
     }
 }
 
-/// Mean of what is finite of some values.
+/// Mean of the finite values.
 #[derive(Default)]
 struct Mean {
     sum: f64,
@@ -60,7 +61,7 @@ struct Mean {
 }
 
 impl Mean {
-    /// * returns - how many were finite.
+    /// * returns - the number of finite values.
     fn take(&mut self, values: &[f64]) -> u64 {
         let before = self.count;
         for value in values.iter().filter(|value| value.is_finite()) {
@@ -106,7 +107,7 @@ fn of_contact(row: &ContactRow) -> [u64; 9] {
     ]
 }
 
-/// All that was published of a run.
+/// Everything published in a run.
 struct Published {
     pairs: Hash,
     contacts: Hash,
@@ -137,7 +138,7 @@ impl Published {
     }
 }
 
-/// Poses to the micrometre and the microradian.
+/// Rounds poses to the micrometre and quaternion components to a millionth.
 fn round(drive: &mut Drive) {
     for row in drive.rows_mut() {
         let values = row.position.iter_mut().chain(&mut row.orientation);
@@ -145,7 +146,7 @@ fn round(drive: &mut Drive) {
     }
 }
 
-/// The line of a run.
+/// Runs a scene and returns its line.
 fn line(name: &str, scene: &str, pattern: Pattern, budget: Budget) -> String {
     let scene = scene.replace("moves = true\n", NEAR);
     let mut drive = Drive::new(&scene, pattern, 5);
@@ -186,7 +187,7 @@ fn line(name: &str, scene: &str, pattern: Pattern, budget: Budget) -> String {
     )
 }
 
-/// Whether two lines tell of the same.
+/// Whether two lines are equal up to the tolerance of their means.
 fn is_same(one: &str, other: &str) -> bool {
     let [one, other] = [one, other].map(|line| line.split(' ').collect::<Vec<_>>());
     let (exact, close) = (0..WORDS - 2, WORDS - 2..WORDS);

@@ -1,5 +1,5 @@
-//! Goal: what makes a tick in each mode, and that silence is never taken for safety. Method: the pacer and a world, a clock
-//! turned by hand from wake-up to wake-up, frames delivered at given times; every tick is noted down.
+//! Goal: the cause of each tick in every mode, and that silence never counts as safety. Method: the pacer and a world,
+//! a manual clock advanced from wake-up to wake-up, frames delivered at given times; every tick is recorded.
 #![allow(
     clippy::unwrap_used,
     clippy::float_cmp,
@@ -26,15 +26,15 @@ use support::{MS, START_NS, TIMEOUT_NS, cube, fixed, frame, moving, row, scene};
 const HEARTBEAT_NS: u64 = 100 * MS;
 const LATE_NS: u64 = 5 * MS;
 
-/// One tick as it went out.
+/// One published tick.
 #[derive(Clone, Debug)]
 struct Tick {
-    /// Since the start.
+    /// Time since the start, milliseconds.
     at_ms: f64,
     due: Due,
     /// `(source, seq)` of its frames.
     frames: Vec<(String, u64)>,
-    /// Whether the world alone forbids `clear`.
+    /// Whether the state of the world alone forbids `clear`.
     unsafe_word: bool,
     known: u64,
 }
@@ -51,7 +51,7 @@ struct Daemon {
     passed: Vec<(Option<SourceSlot>, u64)>,
 }
 
-/// A mode with one tick for each frame of `sim`.
+/// The mode with one tick per frame of `sim`.
 fn on_sim() -> Mode {
     Mode::OnFrame("sim".to_owned())
 }
@@ -91,7 +91,7 @@ impl Daemon {
         }
     }
 
-    /// Delivers frames (milliseconds since the start, frame) and runs every tick that falls due until `end_ms`.
+    /// Delivers frames (milliseconds since the start, frame) and runs every due tick until `end_ms`.
     fn run(&mut self, end_ms: f64, mut frames: Vec<(f64, Frame)>) -> &[Tick] {
         let first = self.ticks.len();
         let end_ns = ns(end_ms);
@@ -188,7 +188,7 @@ fn robot(seq: u64) -> Frame {
     frame("robot", seq, 0, &[row(2, 5.0)])
 }
 
-/// `count` frames, one each `every_ms` from `from_ms` on, numbered from 1.
+/// `count` frames, numbered from 1, from `from_ms` on at intervals of `every_ms`.
 fn stream(make: fn(u64) -> Frame, count: u64, from_ms: f64, every_ms: f64) -> Vec<(f64, Frame)> {
     (0..count)
         .map(|k| (from_ms + every_ms * k as f64, make(k + 1)))
@@ -227,7 +227,7 @@ fn law_4_4_silence_of_killed_sources_is_never_clear() {
         let mut daemon = Daemon::of(mode.clone());
         let mut frames = stream(sim, 50, 1.0, 10.0);
         frames.extend(stream(robot, 50, 1.0, 10.0));
-        // The last frames come at 491 ms.
+        // The last frames arrive at 491 ms.
         let ticks = daemon.run(3000.0, frames);
         assert_heartbeats(ticks, 0.0, 3000.0);
         assert!(
@@ -262,7 +262,7 @@ fn law_4_4_silence_of_a_suspended_machine_is_never_clear() {
         let mut frames = stream(sim, 40, 1.0, 10.0);
         frames.extend(stream(robot, 40, 1.0, 10.0));
         daemon.run(400.0, frames);
-        // Asleep for an hour; the wake-up is late by all of it.
+        // Suspended for an hour, so the wake-up is an hour late.
         daemon.clock.advance(3_600_000 * MS);
         let first = daemon.ticks.len();
         daemon.run_due();
@@ -278,7 +278,7 @@ fn law_4_4_silence_of_a_suspended_machine_is_never_clear() {
 #[test]
 fn law_4_4_on_frame_makes_one_tick_of_each_frame_in_order() {
     let mut daemon = Daemon::of(on_sim());
-    // Five frames at once, and a robot that is ten times as fast.
+    // Five frames at once, and a robot with frames ten times as often.
     let mut frames: Vec<_> = (1..=5).map(|seq| (20.0, sim(seq))).collect();
     frames.extend(stream(robot, 100, 0.5, 1.0));
     let ticks = daemon.run(100.0, frames);
@@ -292,11 +292,11 @@ fn law_4_4_on_frame_makes_one_tick_of_each_frame_in_order() {
         assert_eq!(tick.due.source, Some(SourceSlot(0)));
         assert!(!tick.due.ages_only);
     }
-    // The robot's newest goes with the first, the nineteen before it are passed over and counted.
+    // The first tick takes the robot's newest frame; the nineteen before it are skipped and counted.
     assert_eq!(by_frame[0].frames[0], ("robot".to_owned(), 20));
     assert_eq!(daemon.passed_of(0), 0);
     assert!(daemon.passed_of(1) >= 19);
-    // All other ticks judge ages only and take nothing.
+    // All other ticks only judge ages and take no frame.
     let others = daemon
         .ticks
         .iter()
@@ -338,12 +338,12 @@ fn law_4_4_frames_that_were_lost_on_their_way_are_counted() {
         };
         let session = sim(1).header.session;
         let frames = vec![
-            // A client that was there before: what it sent earlier is no loss of ours.
+            // A client that was connected earlier: frames from before are not counted as lost.
             (600.0, sim(7)),
             (1200.0, sim(8)),
             (1800.0, sim(11)),
             (2400.0, sim(12)),
-            // An old number, an epoch and a session with numbers of their own: nothing is missing.
+            // An old number, and a new epoch and a new session with their own numbering: no frame is missing.
             (3000.0, sim(2)),
             (3600.0, sim(13)),
             (4200.0, again(1, 1, session)),
@@ -352,7 +352,7 @@ fn law_4_4_frames_that_were_lost_on_their_way_are_counted() {
         daemon.run(9600.0, frames);
         assert_eq!(daemon.passed_of(0), 2, "{mode:?}");
         assert_eq!(daemon.passed_of(1), 0);
-        // A number out of all proportion overflows no count.
+        // An absurdly high number does not overflow the counter.
         let absurd = (1..=4_u32).flat_map(|epoch| {
             let at_ms = 10_000.0 + 10.0 * f64::from(epoch);
             let frame = |seq| again(seq, epoch.into(), session + 1);
@@ -369,7 +369,7 @@ fn law_4_4_a_round_takes_the_newest_frame_of_each_live_source() {
     let frames = vec![
         (1.0, sim(1)),
         (1.0, robot(1)),
-        // The faster source sends twice before the slower one: its first is passed over.
+        // The faster source sends twice before the slower one: its first frame is skipped.
         (10.0, sim(2)),
         (11.0, sim(3)),
         (12.0, robot(2)),
@@ -392,12 +392,12 @@ fn law_4_4_a_late_source_is_not_waited_for_until_its_next_frame() {
     let frames = vec![
         (1.0, sim(1)),
         (1.0, robot(1)),
-        // The robot is late for this round, which closes 5 ms after its first frame, ...
+        // The robot misses this round, which closes 5 ms after its first frame, ...
         (10.0, sim(2)),
-        // ... and holds up none of the next ones, ...
+        // ... and does not delay the next ones, ...
         (20.0, sim(3)),
         (30.0, sim(4)),
-        // ... until it is back: its own frame opens a round that takes the sim's.
+        // ... until it sends again: its frame opens a round that includes the frame of `sim`.
         (35.0, robot(2)),
         (37.0, sim(5)),
         (40.0, sim(6)),
@@ -474,7 +474,7 @@ fn law_4_4_a_rate_does_not_make_up_for_missed_beats() {
     let mut daemon = Daemon::of(Mode::Rate(100.0));
     let ticks = daemon.run(50.0, Vec::new());
     assert_eq!(ticks.len(), 6, "at 0, 10, .. 50 ms");
-    // The daemon is held up for 35 ms: one tick at once, then the beats as they were.
+    // The daemon is delayed by 35 ms: one tick follows at once, then the original schedule.
     daemon.clock.advance(35 * MS);
     let at: Vec<f64> = daemon
         .run(110.0, Vec::new())
@@ -491,7 +491,7 @@ fn law_4_4_a_slow_rate_takes_the_newest_state_with_each_heartbeat() {
     frames.extend(stream(robot, 190, 1.0, 10.0));
     let ticks = daemon.run(1900.0, frames);
     assert_heartbeats(ticks, 0.0, 1900.0);
-    // A body is not called stale because its frames waited for the beat.
+    // No body becomes stale while its frames wait for the next scheduled tick.
     assert!(ticks[1..].iter().all(|t| t.known == 3 && !t.unsafe_word));
 }
 
@@ -521,7 +521,7 @@ fn law_4_2_a_session_that_was_heard_in_time_is_not_taken_over_by_a_frame_that_wa
     let mut daemon = Daemon::of(on_sim());
     let mut other = robot(1);
     other.header.session = 77;
-    // The robot sends all the time; an intruder asks once; no tick for 700 ms takes either.
+    // The robot sends all the time; a frame of another session arrives once; for 700 ms no tick takes frames of either.
     let mut frames = vec![
         (1.0, robot(1)),
         (2.0, sim(1)),
@@ -544,7 +544,7 @@ fn law_4_2_an_ended_session_ends_after_the_last_of_its_frames() {
     daemon
         .pacer
         .take(&mut daemon.drained, &daemon.world, now_ns);
-    // The first tick is a heartbeat and takes no frame: the session is not ended before it was heard.
+    // The first tick is a heartbeat without frames: the session must not be ended before its frame was taken.
     daemon.run(10.0, Vec::new());
     assert_eq!(daemon.world.sources()[1].frames(), 0);
     let mut lead = sim(1);
@@ -554,17 +554,17 @@ fn law_4_2_an_ended_session_ends_after_the_last_of_its_frames() {
     assert_eq!(daemon.world.sources()[1].session, 0);
 }
 
-/// Vertices of a source, to be drained next.
+/// Queues vertices of a source for the next drain.
 fn bend(daemon: &mut Daemon, source: &str, session: u64, seq: u64, version: u64) {
     let header = &mut daemon.drained.push_vertices().header;
     (header.session, header.seq, header.version) = (session, seq, version);
     (header.source, header.schema) = (sweepd::wire::name_bytes(source), WIRE_VERSION);
 }
 
-/// What a tick takes: `(session, seq)` of frames, versions of vertices.
+/// Input that a tick takes: `(session, seq)` of frames, versions of vertices.
 type Taken = (Vec<(u64, u64)>, Vec<u64>);
 
-/// What the next tick takes once what was drained is with the pacer.
+/// The input that the next tick takes, after the pacer has the drained messages; `None`: no tick is due.
 fn next(daemon: &mut Daemon) -> Option<Taken> {
     let now_ns = daemon.clock.boottime_ns();
     daemon
@@ -584,7 +584,7 @@ fn law_4_4_vertices_wait_for_the_frame_that_they_belong_with() {
     bend(&mut daemon, "robot", 1, 5, 50);
     bend(&mut daemon, "sim", 1, 0, 2);
     bend(&mut daemon, "robot", 1, 0, 51);
-    // The first tick is a heartbeat. What is of no frame keeps its place behind what was sent before.
+    // The first tick is a heartbeat. Vertices that belong to no frame stay behind those sent before them.
     assert_eq!(next(&mut daemon), Some((vec![], vec![])));
     assert_eq!(next(&mut daemon), None);
     *daemon.drained.push() = sim(1);
@@ -596,10 +596,10 @@ fn law_4_4_vertices_wait_for_the_frame_that_they_belong_with() {
     assert_eq!(next(&mut daemon), Some((vec![(1, 1)], vec![1, 2])));
     assert_eq!(next(&mut daemon), Some((vec![(1, 2)], vec![3, 4])));
     assert_eq!(next(&mut daemon), Some((vec![(1, 3)], vec![])));
-    // Its own frame is silent for too long: what is not of the lead waits for a time-out.
+    // Its frame does not come. Vertices of a source that does not lead wait for at most a timeout.
     daemon.clock.advance(TIMEOUT_NS);
     assert_eq!(next(&mut daemon), Some((vec![], vec![50, 51])));
-    // Its session ends: what waited for a frame that never comes is gone with it.
+    // Its session ends: vertices that wait for a frame that never comes are dropped with it.
     daemon.drained.end_session(1);
     daemon.clock.advance(200 * MS);
     assert_eq!(next(&mut daemon), Some((vec![], vec![])));
@@ -621,7 +621,7 @@ fn law_4_4_bug_vertices_ahead_of_a_frame_that_comes_a_tick_later_bent_the_pose_b
             let of_sim = frames.iter().filter(|(_, seq)| *seq >= 10);
             (of_sim.map(|(_, seq)| *seq).collect::<Vec<_>>(), versions)
         };
-        // Both send, so that a round ends and the lead has a frame.
+        // Both sources send, so that a round is complete and the lead has a frame.
         let mut seq = 0;
         let mut send = |daemon: &mut Daemon, of_sim: u64| {
             seq += 1;
@@ -630,23 +630,23 @@ fn law_4_4_bug_vertices_ahead_of_a_frame_that_comes_a_tick_later_bent_the_pose_b
         };
         assert_eq!(tick(&mut daemon), (vec![], vec![]), "{mode:?}");
         bend(&mut daemon, "sim", 1, 10, 1);
-        // What is of no frame keeps its place.
+        // Vertices that belong to no frame keep their order.
         bend(&mut daemon, "sim", 1, 0, 2);
         assert_eq!(tick(&mut daemon), (vec![], vec![]), "{mode:?}");
         send(&mut daemon, 10);
         assert_eq!(tick(&mut daemon), (vec![10], vec![1, 2]), "{mode:?}");
-        // Its frame was taken before, or one after it.
+        // Their frame, or a later one, was already taken.
         bend(&mut daemon, "sim", 1, 10, 3);
         assert_eq!(tick(&mut daemon), (vec![], vec![3]), "{mode:?}");
         bend(&mut daemon, "sim", 1, 11, 4);
         send(&mut daemon, 12);
         assert_eq!(tick(&mut daemon), (vec![12], vec![4]), "{mode:?}");
-        // It never comes.
+        // Their frame never comes.
         bend(&mut daemon, "sim", 1, 13, 5);
         assert_eq!(tick(&mut daemon), (vec![], vec![]), "{mode:?}");
         daemon.clock.advance(TIMEOUT_NS - HEARTBEAT_NS);
         assert_eq!(tick(&mut daemon), (vec![], vec![5]), "{mode:?}");
-        // Nobody waits for a stranger's frame.
+        // Vertices of another session do not wait for its frame.
         send(&mut daemon, 14);
         assert_eq!(tick(&mut daemon), (vec![14], vec![]), "{mode:?}");
         bend(&mut daemon, "sim", 77, 15, 70);
@@ -665,7 +665,7 @@ fn law_4_4_bug_vertices_of_a_round_that_is_under_way_went_ahead_of_their_frame()
     daemon
         .pacer
         .take(&mut daemon.drained, &daemon.world, now_ns);
-    // The tick of an edit leaves the round alone.
+    // The tick of an edit does not affect the round.
     let due = daemon.pacer.due(now_ns, true, None, &mut daemon.inbox);
     assert_eq!(due.unwrap().cause, TickCause::Edit);
     assert!(daemon.inbox.frames().is_empty() && daemon.inbox.vertices().is_empty());
@@ -677,7 +677,7 @@ fn law_4_4_bug_vertices_of_a_round_that_is_under_way_went_ahead_of_their_frame()
 fn law_4_2_bug_vertices_of_another_session_wait_for_the_frames_of_the_one_in_force() {
     let mut daemon = Daemon::of(on_sim());
     daemon.run(5.0, vec![(1.0, robot(1)), (2.0, sim(1))]);
-    // The robot's frames wait for the lead; another one's vertices would be taken with any tick.
+    // The robot's frames wait for the lead; vertices of another session would be taken in any tick.
     for seq in 2..=4 {
         *daemon.drained.push() = robot(seq);
     }
@@ -685,7 +685,7 @@ fn law_4_2_bug_vertices_of_another_session_wait_for_the_frames_of_the_one_in_for
     daemon.clock.advance(HEARTBEAT_NS);
     assert_eq!(next(&mut daemon), Some((vec![], vec![])));
     *daemon.drained.push() = sim(2);
-    // The newest of the robot's, and the lead's.
+    // The newest frame of the robot, and that of the lead.
     assert_eq!(next(&mut daemon), Some((vec![(1, 4), (1, 2)], vec![7])));
 }
 
@@ -712,13 +712,13 @@ fn law_4_2_bug_a_strangers_frame_is_none_of_the_round() {
     assert_eq!(tick.at_ms, 22.0);
     assert!(tick.frames.contains(&("robot".to_owned(), 2)));
     assert_eq!(daemon.world.sources()[1].session, 1);
-    // Who has ended is no stranger to the one that comes after it.
+    // After the end of the session in force the next session counts as a participant.
     daemon.drained.end_session(1);
     let mut next = robot(1);
     next.header.session = 78;
     let mut lead = sim(1);
     lead.header.session = 78;
-    // Nobody else is there to be waited for.
+    // There is no other source to wait for.
     let ticks = daemon.run(60.0, vec![(50.0, next), (51.0, lead)]);
     assert_eq!((ticks[0].at_ms, ticks[0].frames.len()), (50.0, 1));
 }
@@ -729,7 +729,8 @@ fn law_4_2_bug_what_is_of_another_boot_begins_no_round() {
     daemon.world.set_boot(7);
     let mut left_over = sim(1);
     left_over.header.boot = 8;
-    // It would be missed in the round that it began, and not waited for in the next.
+    // The foreign frame would have begun a round and missed it, and the next round would not have waited for its
+    // source.
     daemon.run(1.0, vec![(0.0, robot(1))]);
     let ticks = daemon.run(9.0, vec![(2.0, left_over)]);
     assert!(ticks.is_empty(), "{ticks:?}");
@@ -746,23 +747,23 @@ fn law_4_4_bug_vertices_go_with_their_frame_whoever_else_sends() {
     daemon.run(1.0, Vec::new());
     let mut foreign = sim(1);
     foreign.header.session = 77;
-    // A stranger's frame behind, then before.
+    // A frame of another session after, then before the own one.
     bend(&mut daemon, "sim", 1, 1, 1);
     *daemon.drained.push() = sim(1);
     *daemon.drained.push() = foreign.clone();
-    // Those of the stranger are refused, and that is told soon.
+    // Vertices of the other session are refused, which is reported early.
     bend(&mut daemon, "sim", 77, 2, 70);
     assert_eq!(next(&mut daemon), Some((vec![(1, 1)], vec![1, 70])));
     bend(&mut daemon, "sim", 1, 2, 2);
     *daemon.drained.push() = sim(2);
-    // It makes no tick of its own.
+    // The frame of the other session makes no tick by itself.
     assert_eq!(next(&mut daemon), Some((vec![(77, 1), (1, 2)], vec![2])));
-    // A number that is too high is the frame's that comes next, with what was sent before it and after.
+    // Vertices with a number that is too high go with the next frame, as do those sent before and after them.
     bend(&mut daemon, "sim", 1, 10, 3);
     bend(&mut daemon, "sim", 1, 3, 4);
     *daemon.drained.push() = sim(3);
     assert_eq!(next(&mut daemon), Some((vec![(1, 3)], vec![3, 4])));
-    // Who comes after one that has left waits for its own frame.
+    // Vertices of the session that follows an ended one wait for their own frame.
     daemon.drained.end_session(1);
     bend(&mut daemon, "sim", 78, 1, 80);
     *daemon.drained.push() = sim(4);
@@ -784,7 +785,7 @@ fn law_4_2_bug_a_stranger_that_floods_pushes_no_frame_of_the_lead_out() {
     }
     let (frames, _) = next(&mut daemon).unwrap();
     assert_eq!(frames, [(1, 2)]);
-    // Those that wait are refused with the next heartbeat, and what was too many is told.
+    // Waiting frames are refused at the next heartbeat, and those that exceeded the limit are reported.
     daemon.run(110.0, Vec::new());
     let taken = sweepd::wire::RejectReason::SourceTaken;
     assert!(daemon.world.rejects()[usize::from(taken.code())] > 60);
@@ -800,7 +801,7 @@ fn law_4_2_bug_what_the_world_refuses_takes_nobodys_place_in_a_round() {
         frame.header.session = 77;
         frame
     };
-    // 77 takes over from who is silent, is silent itself, and hears from who is over.
+    // Session 77 takes over from a silent one, is silent itself, and then frames of the ended session arrive.
     let silent_ms = (TIMEOUT_NS / MS) as f64 + 10.0;
     let then_ms = 2.0 * silent_ms;
     daemon.run(silent_ms + 1.0, vec![(silent_ms, of_77(1))]);
@@ -840,7 +841,7 @@ fn law_4_2_bug_a_stranger_is_told_so_with_the_next_heartbeat() {
     ] {
         assert_eq!(rejects(&daemon, reason), 1, "{reason:?}");
     }
-    // Who is in force leaves while the other one waits: it waits no more.
+    // The session in force ends while the other one waits: the other need not wait any longer.
     stranger.header.seq = 2;
     let ticks = daemon.ticks.len();
     daemon.run(120.0, vec![(115.0, stranger)]);
@@ -895,7 +896,7 @@ fn timeouts_are_told_at_their_time() {
     for mode in modes() {
         let mut daemon = Daemon::of(mode.clone());
         let ticks = daemon.run(700.0, vec![(150.0, sim(1)), (150.0, robot(1))]);
-        // A beat may be there at the very time-out and tell it.
+        // A scheduled tick may fall exactly on the timeout and report it.
         let at_ms = 150.0 + TIMEOUT_NS as f64 / MS as f64;
         let told = ticks.iter().find(|t| t.at_ms >= at_ms).unwrap();
         assert!(told.unsafe_word && told.at_ms <= at_ms, "{mode:?} {told:?}");

@@ -1,6 +1,6 @@
-//! Goal: a panic of the daemon unwinds, says one line, ends with exit code 101 and leaves nothing in shared memory.
-//! Method: this program again as the daemon, by the door that `main` uses, in a host whose log panics at the first line
-//! with a word in it: the daemon itself has no way to be made to panic.
+//! Goal: a panic of the daemon unwinds, prints one line, ends with exit code 101 and leaves nothing in shared memory.
+//! Method: this program runs again as the daemon, through the entry point that `main` uses, with a log that panics at
+//! the first line that contains a given word: there is no way to make the daemon itself panic.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -19,12 +19,12 @@ use tracing::field::{Field, Visit};
 use tracing::span::{Attributes, Id, Record};
 use tracing::{Event, Metadata};
 
-/// The daemon says it once it is up.
+/// The daemon logs this word once it is ready.
 const WORD: &str = "bodies";
-/// First argument of the program when it is the daemon's host.
+/// First argument of this program when it hosts the daemon.
 const HOST: &str = "run";
 
-/// A log that breaks down.
+/// A log that panics.
 struct Broken;
 
 struct Reader;
@@ -59,7 +59,7 @@ fn main() -> ExitCode {
             tracing::subscriber::set_global_default(Broken).unwrap();
             return sweepd::cli::main();
         }
-        // The test runner's own words: this program is one test, and none of the ignored ones.
+        // Arguments of the test runner: this program is one test, and it is not among the ignored ones.
         Some("--list" | "--ignored") => return ExitCode::SUCCESS,
         _ => {}
     }
@@ -89,7 +89,7 @@ fn a_panic_is_one_line_and_code_101_and_leaves_nothing() {
     assert!(text.contains("please report it"), "{text}");
     assert!(ended.stdout.is_empty());
     assert_eq!(desk.files(), Vec::<std::path::PathBuf>::new());
-    // The instance is free again.
+    // The instance can be used again.
     let _daemon = desk.run(TWO_SPHERES, &[]);
     drop(desk.client(None));
 }

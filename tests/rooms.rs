@@ -1,20 +1,20 @@
-//! The import law: a room names only rooms above its own line or to its left on it, and the foundation. The outside
-//! crates have one door each. Read from the sources as text.
+//! The dependency rule: a module of `src` (a room) may name only rooms on lines above its own in `HOUSE`. Each external
+//! crate may be named only in its own files. Both are checked on the text of the sources.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The house from top to bottom. Rooms of one inner list are side by side: they may not name each other.
+/// The rooms from the lowest to the highest layer. Rooms on one line may not name each other.
 const HOUSE: &[&[&str]] = &[
-    // foundation
+    // foundation: used by all rooms
     &["error", "ids", "limits", "time", "math", "simd"],
-    // walls
+    // wire format and transport
     &["wire"],
     &["config"],
     &["transport"],
-    // corridor
+    // geometry and collision, from shapes to results
     &["shape"],
     &["scene"],
     &["world"],
@@ -25,7 +25,7 @@ const HOUSE: &[&[&str]] = &[
     // engine
     &["plan"],
     &["tick"],
-    // around
+    // users of the engine
     &["query"],
     &["builtin"],
     &["record"],
@@ -34,10 +34,10 @@ const HOUSE: &[&[&str]] = &[
     &["cli"],
 ];
 
-/// Rooms that may name `transport`: the corridor and the engine may not.
+/// Rooms that may name `transport`; those of the lines from `shape` to `tick` may not.
 const OUTSIDE: &[&str] = &["transport", "query", "record", "report", "daemon", "cli"];
 
-/// An outside crate and the only files that may name it.
+/// An external crate and the only files that may name it.
 const DOORS: &[(&str, &[&str])] = &[
     ("iceoryx2", &["transport/iceoryx", "wire/"]),
     ("parry3d_f64", &["shape/", "narrow/exact"]),
@@ -84,15 +84,15 @@ fn all() -> Vec<(String, String, String)> {
             .unwrap()
             .trim_end_matches(".rs")
             .to_owned();
-        // The root of the library and the binary hold no code of a room.
+        // The root files of the library and the binary belong to no room.
         (room != "lib" && room != "main")
             .then(|| (name.clone(), room, fs::read_to_string(path).unwrap()))
     });
     with_room.collect()
 }
 
-/// The code without comments and without its tests, which may name any room: a module of theirs that stands in the
-/// file is its end, one that is declared only is left out.
+/// The code without comments and without tests, which may name any room: an inline test module ends the code of its
+/// file, a declaration of a test module is skipped.
 fn code(text: &str) -> String {
     let mut body = String::new();
     for (at, part) in text.split("#[cfg(test)]\nmod ").enumerate() {
@@ -114,7 +114,8 @@ fn code(text: &str) -> String {
         .join("\n")
 }
 
-/// The rooms that a text names as `crate::ROOM`; a brace is no room, and in none.
+/// The rooms that a text names as `crate::ROOM`. For `crate::{..}` the entry starts with a brace, which is no room's
+/// name.
 fn named(text: &str) -> Vec<String> {
     let mut rooms: Vec<String> = text
         .split("crate::")
@@ -193,7 +194,7 @@ fn every_file_says_its_duty_and_stays_short() {
         }
         for (at, line) in text.lines().enumerate() {
             let words = line.trim_start();
-            // A table is as wide as it is.
+            // A line of a table may be wider.
             let prose = words.starts_with("//") && !words.contains(" | ");
             if prose && line.chars().count() > 120 {
                 wrong.push(format!(

@@ -1,5 +1,5 @@
-//! Goal: a scene file is read whole and strictly, and each mistake gives one error with file, line, body and the mend.
-//! Method: the example scene, then one small wrong scene for each rule, compared with the words a user needs.
+//! Goal: a scene file is read completely and strictly, and each mistake gives one error with file, line, body and the
+//! fix. Method: the example scene, then one small wrong scene for each rule, compared with the words a user needs.
 
 #![allow(
     clippy::unwrap_used,
@@ -48,7 +48,7 @@ fn the_example_scene_is_read_with_every_key() {
     );
     let base = scene.bodies.iter().find(|b| b.name == "arm_base").unwrap();
     assert_eq!((base.id, base.source), (BodyId(10), None));
-    // The least free ids, in the file's order.
+    // The least free ids, in the order of the file.
     assert_eq!(scene.bodies[0].id, BodyId(1));
     assert_eq!(scene.bodies[6].id, BodyId(6));
     assert_eq!(scene.bodies[11].id, BodyId(12));
@@ -70,7 +70,7 @@ fn bug_a_viewpoint_looks_along_any_direction_that_is_not_zero() {
     assert!(error.to_string().contains("has no length"), "{error}");
 }
 
-/// A reader of each table tells all its keys when it meets one that is like none of them.
+/// The reader of each table lists all its keys in the error for an unknown key.
 #[test]
 fn the_example_scene_names_every_key_there_is() {
     let example = std::fs::read_to_string("launch-free-scripts/example_scene.toml").unwrap();
@@ -168,10 +168,10 @@ fn a_scene_is_built_again_of_its_text_and_the_files_that_were_kept() {
             "../tests/data/meshes/wedge.stl"
         ]
     );
-    // What was read is not read, and kept, again.
+    // Files that were read are not read and stored again.
     scene.build_shapes(&mut library, |_, _| {}).unwrap();
     assert!(library.take_kept().is_empty());
-    // With a name by which no folder is found.
+    // With a path whose folder does not exist.
     let text = Scene::read_text(path).unwrap();
     let twin = Scene::parse_kept(&text, "/nowhere/scene.toml").unwrap();
     assert_eq!(twin.bodies, scene.bodies);
@@ -247,7 +247,7 @@ fn the_three_wedges_are_the_same_solid() {
     }
 }
 
-/// The error of a scene text, with sources `one` and `two` before it where it has none of its own.
+/// The error of a scene text; sources `one` and `two` are added if it has none of its own.
 fn error(text: &str) -> String {
     match Scene::parse(text, "bad.toml", Path::new("tests/data/meshes")) {
         Err(error) => error.to_string(),
@@ -255,14 +255,14 @@ fn error(text: &str) -> String {
     }
 }
 
-/// A ball that stands still, with more keys.
+/// A ball that does not move, with further keys.
 fn ball(name: &str, keys: &str) -> String {
     format!(
         "[[body]]\nname = \"{name}\"\nmoves = false\n{keys}\nshape = {{ type = \"sphere\", radius = 1 }}\n"
     )
 }
 
-/// A body that stands still, with this shape in line 4.
+/// A body that does not move, with this shape in line 4.
 fn shaped(shape: &str) -> String {
     format!("[[body]]\nname = \"b\"\nmoves = false\nshape = {{ {shape} }}\n")
 }
@@ -342,7 +342,7 @@ fn a_mesh_that_fails_when_it_is_built_names_file_line_and_body() {
     std::fs::write(folder.join("empty.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\n").unwrap();
     std::fs::write(folder.join("broken.obj"), "v 0 0 0\nv 1 oops 0\n").unwrap();
     let mut results = Vec::new();
-    // A binary STL whose head speaks of ten million triangles.
+    // A binary STL whose header announces ten million triangles.
     let head = [&[0; 80][..], &10_000_000_u32.to_le_bytes()].concat();
     std::fs::write(folder.join("huge.stl"), head).unwrap();
     let file = std::fs::File::options()
@@ -464,7 +464,7 @@ fn bug_a_scene_that_begins_with_a_mark_of_utf_8_is_read() {
 fn odd_but_legal_things_are_notes() {
     let notes = |text: &str| Scene::parse(text, "a.toml", Path::new("")).unwrap().notes();
     assert!(notes("")[0].contains("no body"));
-    // The example shows every key.
+    // The example contains every key.
     assert!(example().notes().is_empty(), "{:?}", example().notes());
     let still = notes(&ball("a", "continuous = true"));
     assert!(still[0].contains("cannot move"), "{still:?}");
@@ -553,7 +553,7 @@ fn no_damage_to_a_scene_causes_a_panic() {
     ];
     let mut state = 0x5eed_u64;
     let mut random = |bound: usize| {
-        // SplitMix64 (Steele, Lea, Flood 2014), so that the damage is the same everywhere.
+        // SplitMix64 (Steele, Lea, Flood 2014), so that the damage is the same on every machine.
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = state;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

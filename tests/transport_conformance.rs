@@ -1,21 +1,23 @@
-//! Goal: every door keeps the same promises. Method: one suite, two backends (shared memory, memory of this process),
-//! a stand-in daemon that names in each tick the frames it used.
+//! Goal: every door fulfils the same contract. Method: one suite, two backends (shared memory, memory of this process),
+//! and a stand-in daemon that names in each tick the frames it used.
 //!
-//! The ROS 2 node is a door, too, and is not among the backends: half of the suite's rules are about what DDS does not
-//! have.
-//! - *The end of a client ends its session*: DDS tells of a writer's end by its lease, 20 s later; a session ends by
-//!   the source's time-out (law 4.2). *A second daemon is refused*: ROS 2 allows two nodes of one name; both are told.
-//! - *A slow reader keeps the newest 8*: a reader's history is its own, by its depth; what the node keeps for one that
-//!   stopped is bounded (`transport/ros2/wheel.rs`). *Sixteen sources are all heard*, *a flooder starves nobody*:
-//!   frames are best effort, and a receive buffer that is full loses the one as the other; what the node itself passes
-//!   over is counted (`transport/ros2/shelf.rs`).
-//! - *Frames of another layout*, *a broken request is refused*: a type that differs does not match, or is not decoded,
-//!   which is counted; requests are services with types of their own, and no JSON with blobs.
-//! - *Body rows, body verdicts and the plan* are not offered; late joiners get names, and all else with the next tick.
+//! The ROS 2 node is also a door, but not among the backends: half of the rules of this suite are about features that
+//! DDS does not have.
+//! - *The end of a client ends its session*: DDS reports the end of a writer by its lease, 20 s later; there a
+//!   session ends by the source's timeout (law 4.2). *A second daemon is refused*: ROS 2 allows two nodes of one name;
+//!   both are reported.
+//! - *A slow reader keeps the newest 8*: the history of a reader is its own, by its depth; the memory of the node for
+//!   a stopped reader is bounded (`transport/ros2/wheel.rs`). *Sixteen sources are all heard*, *a flooder starves
+//!   nobody*: frames are best effort, and a full receive buffer loses frames of all sources alike; frames that the node
+//!   itself skips are counted (`transport/ros2/shelf.rs`).
+//! - *Frames of another layout*, *a broken request is refused*: a differing type does not match, or is not decoded,
+//!   which is counted; requests are services with their own types, not JSON with blobs.
+//! - *Body rows, body verdicts and the plan* are not offered; late joiners get names at once, and all else with the
+//!   next tick.
 //!
-//! The rules that do hold (each step has its result, passed-over frames are said to be, sessions, epochs, pauses,
-//! restarts with a new boot id, waiting frames, nothing computed for nobody) are held by real peers in
-//! `tests/python/ros2`, and its messages field by field against shared memory.
+//! The other rules (each step has its result, skipped frames are reported, sessions, epochs, pauses, restarts with a
+//! new boot id, waiting frames, no computation without readers) are tested with real peers in `tests/python/ros2`, and
+//! the messages are compared field by field with shared memory.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -174,7 +176,7 @@ fn a_tick_that_is_told_of_while_it_is_under_way_is_followed_by_itself<B: Backend
     client.subscribe(Topics::ALL).unwrap();
     let mut reader = backend.client(None);
     reader.subscribe(Topics::ALL).unwrap();
-    // Twice told of, then itself, under one number.
+    // Announced twice, then published itself, all with one tick number.
     let (mut told, mut last) = (0, 0);
     for x in 1..=20 {
         step(&mut client, 3, f64::from(x)).unwrap();
@@ -368,7 +370,7 @@ fn nothing_is_sent_for_nobody<B: Backend>() {
     assert!(client.view().list().is_none() && client.view().contact_list().is_none());
 }
 
-/// The lists kept from `changes` and `contact_changes` are the pairs and contacts of the same tick.
+/// The lists kept from `changes` and `contact_changes` must equal the pairs and contacts of the same tick.
 fn has_lists(client: &Client) -> bool {
     let view = client.view();
     let (Some(list), Some(contact_list)) = (view.list(), view.contact_list()) else {
@@ -380,7 +382,7 @@ fn has_lists(client: &Client) -> bool {
             contacts.rows
         );
     }
-    // Overtaken in the queue, they are not there to be compared with.
+    // Pairs that were dropped from the queue cannot be compared.
     if let Some(pairs) = view.pairs() {
         assert_eq!(list.iter().collect::<Vec<_>>(), pairs.rows);
     }
@@ -398,14 +400,14 @@ fn lists_kept_from_changes_are_whole_or_not_shown<B: Backend>() {
         step(&mut client, 1 + u64::from(x % 4), f64::from(x)).unwrap();
         assert!(has_lists(&client), "step {x}");
     }
-    // Most of it was overtaken in its queue.
+    // Its queue has dropped most of the messages.
     assert_eq!(slow.latest().unwrap(), Heard::Tick);
     until("the whole list again", || {
         let shown = has_lists(&slow);
         slow.wait_tick(SECOND_NS).unwrap();
         shown
     });
-    // One comes in the place of another, between two ticks or within one.
+    // A new reader replaces the old one, between two ticks or within one.
     for x in 101..=120_u32 {
         drop(slow);
         slow = backend.client(None);
@@ -468,7 +470,7 @@ fn a_restarted_daemon_is_told_with_ends_and_running_clients_go_on<B: Backend>() 
         reader.view().pairs().is_some_and(|p| p.rows.len() == 3)
     });
     daemon.stop();
-    // what came since (heartbeats without pairs) is read, so that the reader's last word is known
+    // reads what has come since (heartbeats without pairs), so that the reader's last message is known
     while reader.wait_tick(SECOND_NS / 20).unwrap() == Heard::Tick {}
     let before = reader.view().pairs().map_or(0, |p| p.rows.len());
     let _again = backend.daemon(Manners {
@@ -601,9 +603,9 @@ fn vertices_come_with_the_frame_that_they_belong_with<B: Backend>() {
     let rows = |at: usize| &log.vertices[at].1;
     assert!((rows(0).iter().zip(&all)).all(|(row, sent)| *row == sent.position));
     assert_eq!(rows(2)[..], some.map(|v| v.position));
-    // Each was there in the round of its frame, or before.
+    // Each message was received in the round of its frame, or earlier.
     drop(client);
-    // Who only ever sends vertices has a session too, and it ends.
+    // A client that sends only vertices has a session too, which ends with it.
     let mut bender = backend.client(Some("bender"));
     bender.send_vertices(9, Part::Full, &all[..10]).unwrap();
     let session = bender.session();
@@ -652,7 +654,7 @@ fn frames_that_waited_while_the_daemon_was_silent_say_so<B: Backend>() {
         nap: Duration::from_millis(200),
         ..Manners::default()
     });
-    // a bare link: a client would wait for the hello of the napping daemon
+    // a bare link, because a client would wait for the hello of the sleeping daemon
     let mut early = backend.link();
     early
         .send(

@@ -1,5 +1,5 @@
-//! Goal: what only shared memory between processes can get wrong: files, locks, killed processes, strangers.
-//! Method: real services under a root and prefix of their own, children of this very test program.
+//! Goal: failures that only shared memory between processes can have: files, locks, killed processes, foreign
+//! processes. Method: real services under a separate root and prefix, and child processes of this test program.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -31,7 +31,7 @@ use sweepd::wire::{
 };
 use transport_support::{Files, Manners, SECOND_NS, StandIn, poses, until};
 
-/// Says to the child program which part it plays, and where.
+/// Environment variables with the part that the child process plays, and its place.
 const PART: &str = "SWEEPD_TEST_PART";
 const ROOT: &str = "SWEEPD_TEST_ROOT";
 const PREFIX: &str = "SWEEPD_TEST_PREFIX";
@@ -72,7 +72,7 @@ fn a_step_over_shared_memory_returns_the_result_of_its_frame_and_nothing_is_left
     assert_eq!(files.left(), Vec::<String>::new());
 }
 
-/// This test program again, as another process; it says a line when it is ready.
+/// Starts this test program again as another process, which prints a line when it is ready.
 fn spawn(files: &Files, part: &str) -> Child {
     let mut child = Command::new(std::env::current_exe().unwrap())
         .args(["--ignored", "--exact", "child_process", "--nocapture"])
@@ -99,7 +99,7 @@ fn kill_and_reap(mut child: Child) {
 #[test]
 #[ignore = "played by children of the other tests"]
 fn child_process() {
-    // Nobody has started it: all ignored tests are run.
+    // Not started by another test: all ignored tests are being run.
     let Ok(root) = std::env::var(ROOT) else {
         return;
     };
@@ -151,7 +151,8 @@ fn a_killed_sources_session_ends_and_its_place_is_free_within_a_second() {
     assert_eq!(daemon.log().ended, [session], "told once");
     assert_eq!(list_instances(&files.place).unwrap()[0].sources, 0);
     println!("slot free after {} ms", ended_ns / 1_000_000);
-    // The figure wanted is a second, and is printed; a loaded machine must not turn the gate red.
+    // The intended duration is a second, which is printed; the limit is higher so that a busy machine does not fail the
+    // test.
     assert!(ended_ns < 10 * SECOND_NS, "{} ms", ended_ns / 1_000_000);
     drop(cleaner);
     daemon.stop();
@@ -369,7 +370,7 @@ fn bug_who_waited_for_an_answer_as_the_daemon_ended_waited_out_its_time() {
         daemon.requests(&mut |token, _, _| tokens.push(token));
         !tokens.is_empty()
     });
-    // This one nobody has looked at.
+    // The daemon has not read this request.
     ask(6);
     drop(daemon);
     let (mut text, mut refused) = (Vec::new(), Vec::new());
@@ -423,7 +424,7 @@ fn bug_an_instance_whose_daemon_was_killed_while_it_made_a_service_could_not_be_
         .unwrap();
     drop(daemon);
     assert!(!path.exists(), "it went with the daemon");
-    // As a file is until its service is made: it may be written.
+    // A file in the state before its service exists: it is writable.
     std::fs::write(&path, text).unwrap();
     std::fs::set_permissions(&path, PermissionsExt::from_mode(0o600)).unwrap();
     drop(server(&files, 0));
@@ -444,7 +445,7 @@ fn bug_a_wait_of_less_than_a_microsecond_ends() {
         }
         ended.send(()).unwrap();
     });
-    // Whoever sleeps for ever is not woken by anything here.
+    // Nothing in this test wakes a thread that sleeps for ever.
     let end = end.recv_timeout(Duration::from_secs(60));
     assert!(end.is_ok(), "a wait does not end");
 }
@@ -455,8 +456,8 @@ fn bug_a_wait_ends_at_its_time_and_not_at_the_next_tick_of_the_systems_timer() {
     let mut server = server(&files, 0);
     let clock = SystemClock;
     while server.wait(0, &clock).unwrap() != sweepd::transport::Wake::default() {}
-    // With 250 ticks a second each of these took 4 ms or more; the least says what the wait is meant to be, whatever
-    // else runs.
+    // With timer ticks at 250 Hz each of these waits took 4 ms or more; the shortest one shows the intended wait,
+    // whatever other load there is.
     let timeout_ns = 2_300_000;
     let took = (0..50).map(|_| {
         let before_ns = clock.monotonic_ns();
@@ -480,7 +481,7 @@ fn a_client_without_a_daemon_times_out_and_makes_nothing() {
     assert!(!files.root.exists(), "only a daemon makes the root");
 }
 
-/// A node of iceoryx2 on the test's files, as any other program could open.
+/// A node of iceoryx2 on the test's files, as any other program could open it.
 fn stranger(files: &Files) -> iceoryx2::prelude::Node<ipc::Service> {
     let mut config = Config::default();
     let root = IoxPath::new(files.root.to_str().unwrap().as_bytes()).unwrap();
@@ -529,7 +530,7 @@ fn rows_or_headers_of_another_type_are_refused_at_the_door() {
 fn a_daemon_of_another_wire_version_is_refused_with_both_versions() {
     let files = Files::new();
     let server = Server::open(ServerOptions::new(files.place.clone(), 7)).unwrap();
-    // a newer daemon's hello, on the service whose layout is frozen
+    // the hello of a newer daemon, on the service whose layout is frozen
     let node = stranger(&files);
     let hello = node
         .service_builder(&"cell/hello".try_into().unwrap())
@@ -561,7 +562,7 @@ fn a_daemon_of_another_wire_version_is_refused_with_both_versions() {
     drop(server);
 }
 
-/// Its topics have other names, and `no daemon runs` was said of it.
+/// Its topics have other names; the error was `no daemon runs`.
 #[test]
 fn bug_a_daemon_that_has_only_the_hello_in_common_is_refused_with_both_versions() {
     let files = Files::new();
@@ -645,7 +646,8 @@ fn what_a_killed_daemon_leaves_is_seen_and_cleaned_on_demand_and_a_living_one_go
     };
     let files_left = shared().len();
 
-    // Nobody who only looks cleans, not even by a client's node that comes and goes, nor does who cleans up elsewhere.
+    // A client that only looks cleans nothing, not even when its node comes and goes, and neither does a cleanup of
+    // another place.
     let reader = ClientOptions {
         place: living.clone().looking_only(),
         ..options(&files, None)
@@ -682,7 +684,7 @@ fn what_a_killed_daemon_leaves_is_seen_and_cleaned_on_demand_and_a_living_one_go
         .unwrap();
     assert_eq!(client.view().tick().header.boot_id, 7);
 
-    // What nobody has mapped is told, and what the living daemon has is not, however old its files look.
+    // A file that no process has mapped is reported; the files of the running daemon are not, however old they look.
     let stray = std::path::Path::new("/dev/shm").join(format!("{}stray", files.prefix));
     std::fs::write(&stray, [0; 8192]).unwrap();
     for path in shared() {
@@ -720,7 +722,7 @@ fn bug_frames_waited_until_a_large_request_was_copied() {
             Rows::Poses(&poses(1, 0.0)),
         )
         .unwrap();
-        // While some of it is not copied yet no wait lasts.
+        // While some of the frames are not copied yet, no wait lasts.
         let wake = server.wait(60 * SECOND_NS, &SystemClock).unwrap();
         assert!(wake.notified);
         inbox.clear();

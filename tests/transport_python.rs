@@ -1,4 +1,4 @@
-//! Goal: the Python client keeps the promises of the Rust one. Method: the stand-in daemon here, `python_client.py`
+//! Goal: the Python client fulfils the contract of the Rust one. Method: the stand-in daemon here, `python_client.py`
 //! as the client, run by the interpreter in `SWEEPD_PYTHON` or else `python3`, if it has numpy and iceoryx2 0.10.0.
 #![allow(
     clippy::unwrap_used,
@@ -15,7 +15,7 @@ use std::process::{Child, Command, Stdio};
 
 use transport_support::{Files, Manners, StandIn};
 
-/// An interpreter that can run the client; `None` says so, and there is nothing to test.
+/// An interpreter that can run the client; if there is none, prints this and returns `None`, and the tests are skipped.
 fn python() -> Option<String> {
     let named = std::env::var("SWEEPD_PYTHON");
     let python = named.clone().unwrap_or_else(|_| "python3".to_owned());

@@ -1,6 +1,6 @@
-//! Goal: Rust, C, Python and the byte table in `msgs/README.md` agree on every field and every code.
-//! Method: one table of fields here, complete by its sizes (no padding, so they must add up); each other side prints
-//! its own, and the texts are compared line by line.
+//! Goal: Rust, C, Python and the byte table in `msgs/README.md` agree on every field and every code. Method: one table
+//! of fields here, whose completeness follows from the sizes (there is no padding, so they must add up); each other
+//! side prints its own table, and the texts are compared line by line.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -120,7 +120,7 @@ fn codes() -> Vec<(&'static str, Vec<(&'static str, u32)>)> {
     all
 }
 
-/// `body moved` or `BodyMoved` as other languages write it.
+/// `body moved` or `BodyMoved` in the spelling of constants in other languages.
 fn screaming(word: &str) -> String {
     let mut out = String::new();
     for (at, c) in word.chars().enumerate() {
@@ -137,7 +137,7 @@ fn screaming(word: &str) -> String {
     out
 }
 
-/// Every field and code as this crate has it: the text the other sides must print.
+/// Every field and code of this crate, as text that the other sides must print.
 fn expected() -> String {
     let mut text = format!("WIRE_VERSION {WIRE_VERSION}\n");
     for layout in layouts() {
@@ -212,7 +212,7 @@ fn the_c_header_has_the_layout_and_the_codes_of_the_daemon() {
     program += "return 0; }\n";
     let (source, binary) = (scratch("layout.c"), scratch("layout_c"));
     std::fs::write(&source, program).unwrap();
-    // the linker that Rust needs is a C compiler
+    // Rust needs a C compiler as its linker, so `cc` is present
     let compiled = Command::new("cc")
         .args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-I"])
         .arg(msgs().join("c"))
@@ -227,7 +227,7 @@ fn the_c_header_has_the_layout_and_the_codes_of_the_daemon() {
     assert_same(&String::from_utf8_lossy(&run.stdout), "msgs/c/sweepd.h");
 }
 
-/// Prints as `expected` does, with nothing but the standard library: neither numpy nor iceoryx2 may be needed.
+/// Prints the text of `expected` with the standard library only: neither numpy nor iceoryx2 may be needed.
 const PYTHON: &str = r#"
 import ctypes, sys
 sys.path.insert(0, sys.argv[1])
@@ -307,7 +307,7 @@ fn rust_bytes(kind: &str) -> usize {
 fn the_byte_table_in_the_readme_has_the_layout_and_the_codes_of_the_daemon() {
     let tables = page();
     for layout in layouts() {
-        // the first row is the heading
+        // the first row is the header
         let rows = &tables[layout.name][1..];
         assert_eq!(rows.len(), layout.fields.len(), "{}", layout.name);
         for (row, (field, offset, size)) in rows.iter().zip(&layout.fields) {
@@ -336,7 +336,7 @@ fn the_byte_table_in_the_readme_has_the_layout_and_the_codes_of_the_daemon() {
     }
 }
 
-/// What stands in quotes after `mark`, the last before or the first after `place`, with nothing of another row between.
+/// The quoted text after `mark`: the last one before `place`, or the first one after it, with no other row in between.
 fn quoted<'a>(text: &'a str, place: &str, before: bool, mark: &str) -> &'a str {
     let at = text.find(place).unwrap_or_else(|| panic!("no `{place}`"));
     let (from, between) = if before {
@@ -408,6 +408,6 @@ fn every_side_gives_a_row_the_same_type_name() {
     names.sort_unstable();
     names.dedup();
     assert_eq!(names.len(), count, "two rows of one name");
-    // The attribute is what iceoryx2 goes by, on both sides of a service.
+    // iceoryx2 compares the types of both sides of a service by this attribute.
     assert!(names.iter().all(|name| name.starts_with("sweepd.")));
 }

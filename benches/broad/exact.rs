@@ -1,4 +1,5 @@
-//! The exact set of overlapping boxes, by a way that no method here goes: strips along y, a sweep along x in each.
+//! The exact set of overlapping boxes, by a method that no measured broad phase uses: strips along y, in each a sweep
+//! along x.
 
 use super::scenes::Box3;
 
@@ -35,7 +36,8 @@ pub fn pairs(boxes: &[Box3]) -> Vec<Pair> {
                 if b[0][0] > a[1][0] {
                     break;
                 }
-                // A pair is told in the strip where the second of the two begins.
+                // A pair can share several strips; it is recorded only in the one that contains the greater of the two
+                // lower y bounds.
                 if strip(a[0][1].max(b[0][1])) == at && overlap(a, b) {
                     found.push((i.min(j), i.max(j)));
                 }

@@ -1,7 +1,7 @@
-//! Every broad phase of ours on the same boxes, one process a run. Beside the peers: `benches/peers`.
+//! All of our broad phases on the same boxes, one process per run. `benches/peers` compares them with other libraries.
 //!
 //! `cargo bench --bench broad -- [--bodies 1000,10000,100000] [--scene gas,pile] [--method order,sap] [--frames N]
-//! [--save]`; what it prints: see `run`.
+//! [--save]`; for the output see `run`.
 
 #![allow(
     missing_docs,

@@ -1,5 +1,5 @@
-//! Ours behind the trait that the peers share: one timed step a frame, and the pairs it left behind. What is timed is
-//! the whole `update` with its pair set and the events in order.
+//! Our broad phases behind the trait that the peers also implement: one timed step per frame, then the resulting pairs.
+//! The timed part is the whole `update`, including its pair set and the sorted events.
 
 use sweepd::broad::{BroadPhase, Method, Work};
 use sweepd::ids::BodySlot;
@@ -14,35 +14,36 @@ use super::common::boxes::{Boxes, Everything};
 use super::exact::Pair;
 use super::scenes::{Box3, Kind, Scene};
 
-/// What is timed.
+/// A broad phase that is timed.
 pub trait Runner {
-    /// One frame; returns the nanoseconds of CPU that it took.
+    /// Runs one frame; returns the CPU time it took, nanoseconds.
     fn step(&mut self, scene: &Scene, first: bool) -> u64;
-    /// The pairs after the last frame, sorted; those whose boxes do not overlap are dropped.
+    /// The pairs after the last frame, sorted; a method may drop pairs whose boxes do not overlap.
     fn pairs(&self, scene: &Scene) -> Vec<Pair>;
-    /// Whether it tells every pair, and not only those of a body that moved in the frame.
+    /// Whether it reports every pair, not only those of bodies that moved in the frame.
     fn whole(&self) -> bool {
         true
     }
-    /// What it did, in its own words.
+    /// Counters of its work, as text for the CSV.
     fn told(&self) -> String {
         String::new()
     }
 }
 
-/// The runners of a full run; `brute`, and the two ways of the order by name (`lasting`, `afresh`), can be asked for too.
+/// The methods of a full run. `--method` also accepts `brute`, and `lasting` and `afresh` (the two modes of `order`,
+/// fixed).
 pub const NAMES: &[&str] = &["limit", "order", "sap", "grid", "hash", "hgrid"];
 
 pub fn runner(name: &str, scene: &Scene) -> Option<Box<dyn Runner>> {
     Some(match name {
         "limit" => Box::new(Limit::default()),
-        // The two ways of the order, whatever the scene.
+        // The two modes of `order`, regardless of the scene.
         "lasting" | "afresh" => {
             let mut ours = Ours::new(Method::Order, scene);
             ours.broad.use_afresh(name == "afresh");
             Box::new(ours)
         }
-        // ... with another thread beside, where that pays.
+        // The same with a second thread, used where it pays off.
         "order2" | "afresh2" => {
             let mut ours = Ours::new(Method::Order, scene);
             ours.broad.use_threads(2, limits::SHARED_TESTS_MIN);
@@ -69,9 +70,9 @@ struct Ours {
     pairs: PairSet,
     delta: PairDelta,
     offset_m: f64,
-    /// Whether time is that of the wall: where threads work, not all of it is this one's.
+    /// Whether wall time is measured instead of this thread's CPU time, which misses the work of other threads.
     by_wall: bool,
-    /// What all frames did, summed.
+    /// Work counters, summed over all frames.
     work: [u64; 6],
     frames: u64,
 }
@@ -84,7 +85,8 @@ impl Ours {
             changes: ChangeSet::default(),
             pairs: PairSet::new(1 << 25),
             delta: PairDelta::default(),
-            // Far from the origin we get the far boxes, the peers the same ones near: f32 would spoil theirs.
+            // In the `Far` scene our boxes are at the offset; the peers get the same boxes near the origin, since f32
+            // would round them.
             offset_m: if scene.kind == Kind::Far { 1e7 } else { 0.0 },
             by_wall: false,
             work: [0; 6],
@@ -93,7 +95,7 @@ impl Ours {
     }
 
     fn take(&mut self, body: u32, b: &Box3) {
-        // Boxes in f64 that are those of f32 moved: exact, for 1e7 leaves 29 bits behind the point.
+        // Adding the offset to an f32 coordinate in f64 is exact: 1e7 leaves 29 bits for the fraction.
         let point = |p: [f32; 3]| Point::from(p.map(|v| f64::from(v) + self.offset_m));
         self.bodies.all[body as usize] = Aabb {
             min: point(b[0]),
@@ -150,7 +152,7 @@ impl Runner for Ours {
     }
 
     fn pairs(&self, _: &Scene) -> Vec<Pair> {
-        // Not filtered: ours must be exact.
+        // Pairs are not filtered: our set must be exact.
         let keys = self.pairs.iter().map(|(_, key)| key.slots());
         let mut pairs: Vec<Pair> = keys.map(|(a, b)| (a.0, b.0)).collect();
         pairs.sort_unstable();
@@ -171,7 +173,7 @@ impl Runner for Ours {
     }
 }
 
-/// Reads every box once and writes every pair once.
+/// Lower bound of the cost: reads every box once and writes every pair once.
 #[derive(Default)]
 struct Limit {
     sink: Vec<u64>,
@@ -186,7 +188,7 @@ impl Runner for Limit {
             self.sink.reserve(self.pairs);
         }
         timed(|| {
-            // Whole numbers: their sum may be taken in any order, so that it is read at full width.
+            // Integer sums are associative, so the compiler can vectorize this loop and read at full bandwidth.
             let bits = scene.boxes.iter().flatten().flatten();
             self.sum = bits.fold(self.sum, |sum, v| sum.wrapping_add(v.to_bits()));
             self.sink.clear();

@@ -1,9 +1,9 @@
-//! One process a run, and what it prints: CSV on stdout, a table of means on stderr.
+//! Runs each method in its own process; prints CSV on stdout and a table of means on stderr.
 //!
-//! A run: build, 40 frames to settle (the first one told apart as `first_us`), then the frames that count. In a middle
-//! frame and the last one the pairs are compared with the exact set; a run that differs is printed as `wrong` and
-//! counts for nothing. A method that tells pairs of what moved only is compared with those, and printed as `part`.
-//! Times are those of the thread's CPU, so that what else runs is mostly left out.
+//! A run: build, 40 frames to settle (the first step is reported as `first_us`), then the measured frames. In a middle
+//! frame and in the last one the pairs are compared with the exact set; a run that differs is printed as `wrong` and
+//! its times are void. A method that reports only pairs of moved bodies is compared with those pairs, and printed as
+//! `part`. Times are CPU time of the thread, which mostly excludes other load on the machine.
 
 use std::fmt::Write as _;
 use std::process::Command;
@@ -13,7 +13,7 @@ use super::methods::Runner;
 use super::scenes::{Kind, Scene};
 
 const SEED: u64 = 7;
-/// Frames before the count begins: modes and margins are learned by then.
+/// Frames before the measurement; after them adaptive modes and margins have settled.
 const SETTLE: usize = 40;
 
 fn option(name: &str) -> Option<String> {
@@ -21,10 +21,10 @@ fn option(name: &str) -> Option<String> {
     arguments.nth(1)
 }
 
-/// What makes a method by its name.
+/// Makes a method by its name; `None`: there is no such method in this build.
 pub type Make = fn(&str, &Scene) -> Option<Box<dyn Runner>>;
 
-/// Runs what the arguments ask for.
+/// Runs the measurements that the command line asks for.
 ///
 /// * `names` - the methods of a full run.
 /// * `save` - where `--save` writes the CSV.
@@ -68,7 +68,7 @@ pub fn main(names: &[&str], make: Make, save: Option<&str>) {
     }
 }
 
-/// One line of the table.
+/// Adds one line to the table.
 fn tell(table: &mut String, scene: &str, rows: &[String]) {
     let _ = write!(table, "{scene:>9}");
     for row in rows {
@@ -87,7 +87,7 @@ fn tell(table: &mut String, scene: &str, rows: &[String]) {
     let _ = writeln!(table);
 }
 
-/// Runs one method in a process of its own.
+/// Runs one method in its own process; returns its CSV row, `None` if it fails.
 fn child(scene: &str, bodies: &str, method: &str) -> Option<String> {
     let mut command = Command::new("timeout");
     command.arg("120").arg(std::env::current_exe().unwrap());
@@ -107,7 +107,7 @@ fn child(scene: &str, bodies: &str, method: &str) -> Option<String> {
     row.map(str::to_owned)
 }
 
-/// One run; prints one row without its provenance.
+/// Runs one method; prints one row without the provenance columns.
 fn one(name: &str, make: Make) {
     let scene_name = option("--scene").unwrap();
     let bodies: usize = option("--bodies").unwrap().parse().unwrap();
@@ -136,7 +136,7 @@ fn one(name: &str, make: Make) {
         }
         wanted.len()
     };
-    // Peers that cannot follow are not waited for: what they did in this time is the row.
+    // A peer that is too slow is stopped after this time; the row then covers the frames it completed.
     let mut left_ns: u64 = 20_000_000_000;
     let mut times = Vec::new();
     let mut memory_kib = 0;
@@ -175,7 +175,7 @@ fn one(name: &str, make: Make) {
     );
 }
 
-/// The most memory this process ever had, KiB.
+/// The peak memory of this process, KiB.
 fn peak_kib() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status

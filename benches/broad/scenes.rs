@@ -1,17 +1,18 @@
-//! The scenes: seeded boxes on their way, the same for every method. Boxes are f32, so that every peer gets the very
-//! numbers that ours gets as f64.
+//! The scenes: seeded moving boxes, the same for every method. Boxes are f32, so that peers get exactly the numbers
+//! that our methods get as f64.
 //!
-//! Lengths in metres, speeds in metres a frame. Half a body a cubic metre where nothing else is said.
+//! Lengths in metres, speeds in metres per frame. Density is 0.5 bodies per cubic metre unless stated otherwise.
 
 use super::common::Rng;
 
 /// A box: lower corner, upper corner.
 pub type Box3 = [[f32; 3]; 2];
 
-/// How a scene is made and moves. What each flatters: `Gas` and `Sheet` fat boxes, `OnePercent` sparse updates, `Pile`
-/// cached pairs; what each punishes: `Pile` a sort on one axis, `Mixed` grids, `Galaxy` cells of one size, `Teleport`
-/// and `Fast` coherence, `Churn` insertion, `Tumble` and `Redraw` predicted motion, `Rove` sleeping sets, `Dense` and
-/// `Heap` pair lists, `Far` f32, `Stray` (a gas and one body 1,000 km from it) an origin and cells by the extent of all.
+/// How a scene is made and moves. `Gas` and `Sheet` favour fat boxes, `OnePercent` sparse updates, `Pile` cached pairs.
+/// `Pile` is hard for a sort on one axis, `Mixed` for grids, `Galaxy` for cells of one size, `Teleport` and `Fast` for
+/// methods that rely on coherence, `Churn` for insertion, `Tumble` and `Redraw` for predicted motion, `Rove` for
+/// sleeping sets, `Dense` and `Heap` for pair lists, `Far` for f32, `Stray` (a gas and one body 1,000 km from it) for
+/// an origin and cell sizes derived from the total extent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Gas,
@@ -60,32 +61,32 @@ impl Kind {
     }
 }
 
-/// One scene on its way.
+/// One scene and its current state.
 pub struct Scene {
     pub kind: Kind,
     pub boxes: Vec<Box3>,
     /// Bodies that moved in this frame; none of them is in `churned`.
     pub moved: Vec<u32>,
-    /// Bodies taken out and put in again elsewhere.
+    /// Bodies removed and inserted at another place in this frame.
     pub churned: Vec<u32>,
     rng: Rng,
     centres: Vec<[f64; 3]>,
     halves: Vec<[f64; 3]>,
     velocities: Vec<[f64; 3]>,
-    /// Where a body of the pile rests, or the middle of its cluster by number.
+    /// Rest position of each body of the pile, or centre of each cluster of the galaxy.
     homes: Vec<[f64; 3]>,
     drifts: Vec<[f64; 3]>,
-    /// Angle and turn a frame about z and x of a rod, radians.
+    /// Per rod: its angle about z, its tilt from z, and the change of each per frame, radians.
     turns: Vec<[f64; 4]>,
     side: [f64; 3],
     frame: usize,
 }
 
-/// Bodies of one cluster of the galaxy.
+/// Bodies per cluster of the galaxy.
 const CLUSTER: usize = 500;
-/// Bodies on one place in the heap.
+/// Bodies of the heap that are all at the same place.
 const HEAP: usize = 2000;
-/// From the gas to its stray body, on each axis.
+/// Distance from the gas to its stray body on each axis, metres.
 const ASTRAY_M: f64 = 1e6;
 
 impl Scene {
@@ -168,7 +169,7 @@ impl Scene {
         self.write(body);
     }
 
-    /// Moves everything by one frame.
+    /// Advances all bodies by one frame.
     pub fn step(&mut self) {
         self.frame += 1;
         self.moved.clear();
@@ -248,7 +249,7 @@ impl Scene {
     fn write(&mut self, body: usize) {
         let (c, mut h) = (self.centres[body], self.halves[body]);
         if self.kind == Kind::Tumble {
-            // A rod 1:10 along its own axis: its box is that of a segment, and its radius.
+            // A rod of radius 0.09 m and total length 1.8 m: the box of its axis segment, enlarged by the radius.
             let [about, tilt, ..] = self.turns[body];
             let axis = [
                 tilt.sin() * about.cos(),
@@ -274,7 +275,7 @@ impl Scene {
         v.map(|x| x * length / norm)
     }
 
-    /// A sum of twelve: near enough to a normal number of deviation 1.
+    /// A sum of twelve uniform numbers: approximately normal with mean 0 and standard deviation 1.
     fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.rng.unit()).sum::<f64>() - 6.0
     }

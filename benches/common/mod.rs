@@ -1,4 +1,4 @@
-//! What the benches share: an engine fed by hand, quantiles, and the columns that say where a figure comes from.
+//! Shared by the benches: an engine fed by hand, quantiles, and the columns that describe the origin of a figure.
 
 #![allow(
     dead_code,
@@ -26,7 +26,7 @@ use sweepd::wire::{
 };
 use sweepd::world::Parts;
 
-/// An engine and the frame it is fed with.
+/// An engine and the frames it is fed with.
 pub struct Bench {
     pub engine: Engine,
     pub scene: Scene,
@@ -36,12 +36,12 @@ pub struct Bench {
     seq: u64,
 }
 
-/// What a tick took, nanoseconds.
+/// The time a tick took, nanoseconds.
 pub struct Took {
     pub wall_ns: u64,
-    /// Of the thread's CPU clock.
+    /// CPU time of the thread.
     pub cpu_ns: u64,
-    /// Of the wall time: work after the outbox was filled.
+    /// Part of the wall time: work after the outbox was filled.
     pub rest_ns: u64,
 }
 
@@ -52,7 +52,7 @@ impl Bench {
         Self::of(scene, shapes.bodies)
     }
 
-    /// * `shapes` - of each body of the scene.
+    /// * `shapes` - the shapes of each body of the scene, in its order.
     pub fn of(scene: Scene, shapes: Vec<Parts>) -> Self {
         let clock = Arc::new(SystemClock);
         let engine = Engine::new(&scene, shapes, 1, Arc::clone(&clock) as Arc<dyn Clock>).unwrap();
@@ -68,7 +68,7 @@ impl Bench {
         }
     }
 
-    /// One tick with a frame of these rows, and what its budget leaves.
+    /// Runs one tick with a frame of these rows, and the work after it for which the budget has time left.
     pub fn tick(
         &mut self,
         rows: &[TransformRow],
@@ -121,7 +121,7 @@ impl Bench {
 
 pub use sweepd::report::rig::row;
 
-/// Ends a daemon that [`another`] started, and takes away what it left.
+/// Ends a daemon that [`another`] started, and deletes its files under `root`.
 pub fn end(daemon: Option<Child>, root: impl AsRef<Path>) {
     if let Some(mut daemon) = daemon {
         drop(daemon.stdin.take());
@@ -130,7 +130,7 @@ pub fn end(daemon: Option<Child>, root: impl AsRef<Path>) {
     let _left = std::fs::remove_dir_all(root);
 }
 
-/// Bodies that fly straight and turn evenly, bouncing off the walls of their cube.
+/// Bodies with constant velocity and angular velocity that bounce off the walls of their cube.
 pub struct Flight {
     pub poses: Vec<Pose>,
     velocities: Vec<Vec3>,
@@ -139,7 +139,7 @@ pub struct Flight {
 }
 
 impl Flight {
-    /// * `step` - metres a tick.
+    /// * `step` - speed, metres per tick.
     pub fn new(scene: &Scene, step: f64, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let moving: Vec<_> = scene.bodies.iter().filter(|body| body.moves).collect();
@@ -163,7 +163,7 @@ impl Flight {
         }
     }
 
-    /// One tick of flight of those bodies.
+    /// Advances the given bodies by one tick.
     pub fn advance(&mut self, who: impl Iterator<Item = usize>) {
         for at in who {
             let pose = &mut self.poses[at];
@@ -183,7 +183,7 @@ impl Flight {
     }
 }
 
-/// The `share` quantile of times, in the unit given.
+/// The `share` quantile of times, in their unit; sorts them.
 pub fn quantile(times: &mut [u64], share: f64) -> u64 {
     times.sort_unstable();
     #[allow(
@@ -196,12 +196,12 @@ pub fn quantile(times: &mut [u64], share: f64) -> u64 {
     times[at]
 }
 
-/// The shared memory of a bench and of the process that it starts, with files of their own.
+/// The shared memory of a bench and of the process that it starts, separate from that of other daemons.
 pub fn place(root: &str) -> Place {
     Place::new("bench").unwrap().under(root, "swbench_")
 }
 
-/// This program again, once it has said `READY`; it is to end when its standard input does.
+/// Starts this program again and waits until it prints `READY`; the new process must end when its standard input ends.
 pub fn another(args: &[&str]) -> Child {
     let mut child = Command::new(std::env::current_exe().unwrap())
         .args(args)
@@ -216,7 +216,7 @@ pub fn another(args: &[&str]) -> Child {
     child
 }
 
-/// How often the scheduler took the core from a process that wanted to go on.
+/// How often the scheduler preempted a process that could have continued.
 pub fn preempted(process: &str) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
     let mut lines = status.lines();
@@ -226,7 +226,8 @@ pub fn preempted(process: &str) -> u64 {
         .unwrap_or(0)
 }
 
-/// The arguments, but for cargo's own. Ends where one is unknown: a bench may run for minutes and save what it found.
+/// The command line without cargo's own argument. Exits at an unknown argument, since a bench can run for minutes and
+/// overwrite saved results.
 pub fn arguments(is_known: impl Fn(&str) -> bool) -> Vec<String> {
     let all = std::env::args().skip(1);
     let mine: Vec<String> = all.filter(|argument| argument != "--bench").collect();
@@ -268,8 +269,8 @@ pub fn provenance() -> String {
     )
 }
 
-/// Rows of a CSV that was saved before, if it has these columns or all but the last ones, of which `keep` says so by their
-/// cells; what they lack is left empty.
+/// Rows of a saved CSV that `keep` accepts by their cells. The saved columns must equal `columns` or a prefix of them;
+/// missing cells are left empty.
 pub fn kept_rows(name: &str, columns: &str, keep: impl Fn(&[&str]) -> bool) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("benches/results")
@@ -286,7 +287,7 @@ pub fn kept_rows(name: &str, columns: &str, keep: impl Fn(&[&str]) -> bool) -> S
     kept.map(|row| format!("{row}{empty}\n")).collect()
 }
 
-/// Writes a CSV beside the bench, and to standard output.
+/// Writes a CSV to `benches/results` and to standard output.
 pub fn save(name: &str, text: &str) {
     print!("{text}");
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -1,4 +1,4 @@
-//! The thin C++ between Rust and Bullet and Jolt (feature `cpp`); physx-sys brings its own.
+//! Builds the C++ wrappers between Rust and Bullet and Jolt (feature `cpp`); physx-sys contains its own.
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
@@ -9,7 +9,7 @@ fn main() {
     }
 }
 
-/// Debian's Bullet, in single precision.
+/// Bullet as packaged by Debian, in single precision.
 #[cfg(feature = "cpp")]
 fn bullet() {
     let headers = "/usr/include/bullet";
@@ -29,8 +29,8 @@ fn bullet() {
     println!("cargo:rustc-link-lib=LinearMath");
 }
 
-/// Jolt as joltc-sys builds it. The options are those of its CMake file: other ones would give other layouts, which
-/// Jolt finds out at the start (`VerifyJoltVersionID`).
+/// Jolt as joltc-sys builds it. The options equal those of its CMake file: others would change struct layouts, which
+/// Jolt detects at startup (`VerifyJoltVersionID`).
 #[cfg(feature = "cpp")]
 fn jolt() {
     println!("cargo:rerun-if-changed=src/jolt.cpp");
@@ -57,7 +57,7 @@ fn jolt() {
     build.file("src/jolt.cpp").compile("peers_jolt");
 }
 
-/// Where the sources of joltc-sys lie: it tells nobody, so cargo is asked.
+/// Folder of the sources of joltc-sys; its build script does not export the path, so `cargo metadata` is asked.
 #[cfg(feature = "cpp")]
 fn jolt_headers() -> std::path::PathBuf {
     let variable = |name: &str| std::env::var(name).expect("cargo sets it");

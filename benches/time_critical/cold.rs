@@ -1,11 +1,13 @@
-//! From nothing: what is known against the budget, each point a fresh start, the one in the middle of several.
+//! Cold starts: the knowledge about all pairs as a function of the budget. Each point is a fresh start, the median of
+//! several.
 //!
-//! `cold`: verdicts are wanted. The area under the share of pairs with a verdict is told against microseconds and
-//! against work units. `cold_bounds`: then distances too, of pairs nearer than [`REPORT_WITHIN_M`].
+//! `cold`: only verdicts are demanded. The area under the curve of the share of pairs with a verdict is given against
+//! microseconds and against work units. `cold_bounds`: after the verdicts also distances of pairs nearer than
+//! [`REPORT_WITHIN_M`].
 //!
-//! Under both, what a pair that is still open leaves unknown: how wide its interval is, and where it may touch. The
-//! interval has the upper end of the bodies' boxes until leaves are met; the region in which it may touch shrinks box
-//! by box whatever the order, so it says what level breadth first has reached.
+//! For both, the uncertainty of open pairs: the width of the distance interval, and the region of a possible contact.
+//! The upper end of the interval is that of the bodies' boxes until the search reaches leaves. The region shrinks box
+//! by box in any order of work, so it shows how deep a breadth-first search has come.
 
 use std::fmt::Display;
 use std::sync::Arc;
@@ -22,35 +24,36 @@ use crate::subject::{Subject, VERDICTS};
 use crate::table::{Limit, Row, tenths};
 use crate::tally::Tally;
 
-/// Budgets of the profile, microseconds, and about what they buy in work units.
+/// Budgets of the profile: microseconds, then work units that take about as long.
 const PROFILE_US: [u64; 11] = [
     50, 100, 200, 300, 500, 750, 1_000, 1_500, 2_000, 5_000, 20_000,
 ];
 const PROFILE_UNITS: [u64; 9] = [
     500, 1_000, 2_000, 4_000, 8_000, 16_000, 32_000, 64_000, 128_000,
 ];
-/// Budgets with bounds, and about what breadth first has for them.
+/// Budgets for verdicts and bounds: microseconds, then work units that a breadth-first search spends in about that
+/// time.
 const BOUNDS_US: [u64; 5] = [500, 1_000, 2_000, 5_000, 20_000];
 const BOUNDS_UNITS: [u64; 5] = [2_500, 5_000, 10_000, 25_000, 100_000];
-/// Budgets as percent of the work that all takes by the same method.
+/// Budgets as percentages of the work that the same method needs to finish.
 const SHARES: [u64; 5] = [5, 10, 25, 50, 75];
-/// More than any two of a pair are apart, metres.
+/// Distance that no pair reaches, metres, so that all are reported.
 const REPORT_WITHIN_M: f64 = 0.5;
-/// Starts at most for a point with bounds, of which some take long.
+/// Most starts per point with bounds, because each takes long.
 const BOUNDS_ROUNDS: usize = 5;
 
-/// What a fresh start came to.
+/// The result of a fresh start.
 struct Run {
     spent_ns: u64,
     spent_cpu_ns: u64,
     units: u64,
     tally: Tally,
-    /// Millionths of the diameter.
+    /// Widths of intervals, millionths of the diameter.
     widths: Vec<u64>,
     regions: Vec<u64>,
 }
 
-/// Where every start is a fresh one.
+/// The stage and method of all starts, each of which is cold.
 struct Bed<'a> {
     name: &'a str,
     stage: Stage,
@@ -98,7 +101,7 @@ impl<'a> Bed<'a> {
         Runs(all)
     }
 
-    /// The rows of shares of the work that all takes.
+    /// Adds the rows whose budgets are shares of the total work.
     fn shares(&mut self, case: &str, work: u64, add: &mut impl FnMut(Row)) {
         for percent in SHARES {
             let runs = self.runs(Limit::Units(work * percent / 100), 1);
@@ -107,7 +110,7 @@ impl<'a> Bed<'a> {
     }
 }
 
-/// Starts under one limit, by how many pairs they left open.
+/// Starts with the same limit, sorted by the number of pairs they left open.
 struct Runs(Vec<Run>);
 
 impl Runs {
@@ -135,7 +138,7 @@ impl Runs {
     }
 }
 
-/// Adds mean and median of shares of the diameter, where there are any.
+/// Adds mean and median of shares of the diameter, if there are any.
 fn spread(row: Row, [mean, median]: [&str; 2], millionths: &[u64]) -> Row {
     if millionths.is_empty() {
         return row;
@@ -147,7 +150,7 @@ fn spread(row: Row, [mean, median]: [&str; 2], millionths: &[u64]) -> Row {
         .put(median, percent(quantile(&mut sorted, 0.5) as f64))
 }
 
-/// The area under the share of pairs with a verdict: trapezoids, from none at a budget of nothing.
+/// Area under the curve of the share of pairs with a verdict: trapezoids, starting at 0 for a budget of 0.
 #[derive(Default)]
 struct Area {
     sum: f64,
@@ -156,7 +159,7 @@ struct Area {
 }
 
 impl Area {
-    /// Goes on to a larger budget; returns the area so far as a share of all that it can be.
+    /// Extends the area to a larger budget; returns it as a share of its greatest possible value.
     fn add(&mut self, budget: u64, share: f64) -> String {
         self.sum += (budget - self.budget) as f64 * (share + self.share) / 2.0;
         (self.budget, self.share) = (budget, share);
@@ -164,7 +167,7 @@ impl Area {
     }
 }
 
-/// Verdicts against the budget.
+/// Measures verdicts as a function of the budget.
 pub fn profile(name: &str, shapes: &[Arc<Shape>], rounds: usize, add: &mut impl FnMut(Row)) {
     let mut bed = Bed::new(name, shapes, false);
     let all = bed.runs(Limit::None, rounds);
@@ -186,7 +189,7 @@ pub fn profile(name: &str, shapes: &[Arc<Shape>], rounds: usize, add: &mut impl 
     bed.shares("cold", all.middle().units, add);
 }
 
-/// Verdicts, then distances, against the budget.
+/// Measures verdicts, then distances, as functions of the budget.
 pub fn bounds(name: &str, shapes: &[Arc<Shape>], rounds: usize, add: &mut impl FnMut(Row)) {
     let rounds = rounds.min(BOUNDS_ROUNDS);
     let mut bed = Bed::new(name, shapes, true);

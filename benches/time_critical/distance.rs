@@ -1,8 +1,8 @@
-//! The exact distance of one pair, cold, against its gap: ours and parry3d-f64 in one run.
+//! The exact distance of one pair, cold, as a function of its gap: ours and parry3d-f64 in one run.
 //!
-//! The pairs that are apart, moved along the line between their nearest points until 0.5, 2 and 5 % of the diameter
-//! part them. CPU time of one thread around each call; the pairs take turns, so no call finds what it reads in the
-//! nearest caches.
+//! Pairs that are apart, moved along the line between their nearest points until the gap is 0.5, 2 and 5 % of the
+//! diameter. CPU time of one thread around each call; the calls rotate through the pairs, so that no call finds its
+//! data in the innermost caches.
 
 use std::sync::Arc;
 
@@ -20,12 +20,12 @@ use crate::table::us;
 
 /// Gaps, percent of the diameter.
 const GAPS: [f64; 3] = [0.5, 2.0, 5.0];
-/// Pairs of which parry is asked: it takes 0.1 s and more for each.
+/// Pairs measured with parry, which takes 0.1 s or more for each.
 const PARRY_PAIRS: usize = 8;
-/// Times each of ours is asked.
+/// Repetitions of each of our queries.
 const ROUNDS: usize = 7;
 
-/// A pair and the pose of the one seen from the other.
+/// A pair, and the pose of one body in the frame of the other.
 struct Couple<'a> {
     shapes: [&'a Shape; 2],
     kinds: [usize; 2],
@@ -33,7 +33,7 @@ struct Couple<'a> {
 }
 
 impl Couple<'_> {
-    /// Moves the two along the line of their nearest points until a gap is left; whether it came to be.
+    /// Moves the two along the line of their nearest points until the gap is `gap_m`; returns whether that succeeded.
     fn part(&mut self, ours: &mut Ours, gap_m: f64) -> bool {
         let [a, b] = self.shapes;
         for _ in 0..50 {

@@ -1,7 +1,8 @@
-//! What it costs that work on a pair can be stopped: the clock is read within it, and it goes in turns.
+//! The cost of making work on a pair interruptible: reading the clock within it, and doing it in slices.
 //!
-//! Each pair cold and to the end, two ways that take turns: at once, without a deadline; and under a deadline that does
-//! not come, in turns of as many units as the engine gives. CPU time of one thread; sums over all pairs, round by round.
+//! Each pair is solved completely from a cold start, alternately in two ways: at once without a deadline, and with a
+//! deadline that never comes, in slices of as many units as in the engine. CPU time of one thread; sums over all pairs,
+//! per round.
 
 use std::sync::Arc;
 
@@ -16,9 +17,9 @@ use crate::peers::{Found, Ours};
 use crate::stage::{Courses, PAIRS};
 use crate::table;
 
-/// Units of a turn.
+/// Work units of a slice.
 const SLICE_UNITS: u64 = 32;
-/// A deadline that no pair comes to.
+/// A deadline that no pair reaches.
 const FAR_NS: u64 = 10_000_000_000;
 
 fn ask(ours: &mut Ours, (a, b, pos12): (&Shape, &Shape, &Pose), goal: Goal, stop: bool) -> Found {

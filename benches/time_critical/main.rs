@@ -1,16 +1,17 @@
-//! What is known when time runs out: 200 pairs of meshes of 19,880 triangles, one thread, at the narrow phase's door.
+//! The results available when time runs out: 200 pairs of meshes of 19,880 triangles, one thread, at the interface of
+//! the narrow phase.
 //!
-//! For each method (see `subject`): a cold start (see `cold`; all verdicts, then what is known against the budget, in
-//! microseconds, in work units and in shares of the method's own work: the share of verdicts and the area under it,
-//! false alarms, widths of intervals, where open pairs may touch), and coherent motion of 0.1, 0.5 and 2 % of the
-//! diameter a tick, without a limit and within 200 and 500 us or so many work units: unresolved pairs, pairs whose last
-//! verdict is not the truth, the oldest pair without a verdict, contacts that were reported late or never, overshoot.
-//! The time starts after the motion pass, which is told beside it. Truth: walks to the end over the other trees.
+//! For each method (see `subject`): a cold start (see `cold`; the cost of all verdicts, then the results as a function
+//! of the budget in microseconds, in work units and in shares of the method's own total work: share of verdicts and the
+//! area under it, false alarms, widths of intervals, regions of possible contact), and coherent motion of 0.1, 0.5 and
+//! 2 % of the diameter per tick, without a limit and within 200 and 500 us or about as many work units: unresolved
+//! pairs, pairs whose last verdict is no longer true, the longest time a pair has had no verdict, contacts reported
+//! late or never, overshoot. The time starts after the motion pass, whose duration is given separately. Truth: complete
+//! walks over the other trees.
 //!
-//! `cargo bench --bench time_critical [-- --quick] [--cold] [METHOD..]`; rows that are not measured anew stay as they
-//! are. `-- regions` for approximate contacts alone (see `regions`), `-- distance` for the distance of one pair,
-//! `-- interruptible` for what it costs that work can be stopped; `-- peers FOLDER` is a part of
-//! `benches/mesh_peers.py`.
+//! `cargo bench --bench time_critical [-- --quick] [--cold] [METHOD..]`; saved rows that are not measured again are
+//! kept. `-- regions` for approximate contacts alone (see `regions`), `-- distance` for the distance of one pair, `--
+//! interruptible` for the cost of interruptible work; `-- peers FOLDER` is started by `benches/mesh_peers.py`.
 
 #![allow(
     clippy::cast_precision_loss,
@@ -74,7 +75,7 @@ fn main() {
     measure(&shapes, &only, quick);
 }
 
-/// Measures the methods that are named, or all.
+/// Measures the named methods, or all if none is named.
 fn measure(shapes: &[Arc<Shape>], only: &[String], quick: bool) {
     let cold_alone = std::env::args().any(|arg| arg == "--cold");
     let (ticks, rounds) = if quick { (20, 3) } else { (99, 15) };

@@ -1,4 +1,4 @@
-//! Coherent motion under a limit a tick, the first tick cold.
+//! Coherent motion with a limit per tick; the first tick is cold.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::subject::{Subject, VERDICTS};
 use crate::table::{Limit, Row, tenths};
 use crate::tally::Tally;
 
-/// Motions of a surface point a tick, percent of the diameter.
+/// Motions of a surface point per tick, percent of the diameter.
 pub const PERCENTS: [f64; 3] = [0.1, 0.5, 2.0];
 
 pub const LIMITS: [Limit; 6] = [
@@ -59,15 +59,15 @@ impl Times {
     }
 }
 
-/// One motion, the same for all that are measured, and which pairs collide in each of its ticks.
+/// One motion, the same for all methods, and which pairs collide in each of its ticks.
 pub struct Motion {
     percent: f64,
     truths: Vec<Vec<bool>>,
 }
 
 impl Motion {
-    /// The truth is found before: the walks look at every tree, and between two ticks they would take the caches from
-    /// what is timed.
+    /// The truth is computed in advance: its walks read every tree, and between two ticks would evict the caches that
+    /// the timed code uses.
     pub fn new(shapes: &[Arc<Shape>], percent: f64, ticks: u64) -> Self {
         let (mut stage, mut walk) = (Stage::new(shapes, percent, SEED), Walk::default());
         let truth = |_| {
@@ -93,7 +93,7 @@ impl Motion {
             subject.spend(&mut stage, VERDICTS, &mut meter);
             let spent_ns = clock.monotonic_ns() - from_ns;
             let spent_cpu_ns = clock.thread_cpu_ns() - cpu_ns;
-            // The first tick is cold, and told by the cold figures.
+            // The first tick is cold and is covered by the cold figures.
             if tick > 1 {
                 times.spent_ns.push(spent_ns);
                 times.spent_cpu_ns.push(spent_cpu_ns);

@@ -1,8 +1,9 @@
-//! Pairs of meshes to the end, cold, beside other libraries: ours and parry3d-f64 here, those in C++ by
-//! `benches/mesh_peers.py`, which starts this once a round.
+//! Complete queries of mesh pairs from a cold start, compared with other libraries: ours and parry3d-f64 here, the C++
+//! ones in `benches/mesh_peers.py`, which starts this program once per round.
 //!
-//! In: a folder. Out, in it: the meshes and the poses, for the others; `rust.csv`, a row for each pair, library and job.
-//! Jobs: `verdict` (do they touch), `distance` (of those that do not), `contacts` (of those that do: all of them).
+//! In: a folder. Out, in that folder: the meshes and the poses for the other libraries; `rust.csv`, a row for each
+//! pair, library and job. Jobs: `verdict` (do the bodies touch), `distance` (if they do not), `contacts` (if they do:
+//! all of them).
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -28,8 +29,8 @@ fn mesh(shape: &Shape) -> &Mesh {
     mesh
 }
 
-/// Vertices as f64 and faces as u32, little-endian, each behind its count; and both poses of each pair: place and
-/// quaternion, x y z w.
+/// File format: vertices as f64 and faces as u32, little-endian, each list after its count; and both poses of each
+/// pair: position and quaternion, x y z w.
 fn write_inputs(folder: &Path, shapes: &[Arc<Shape>], courses: &Courses) {
     for (k, shape) in shapes.iter().enumerate() {
         let mesh = mesh(shape);
@@ -52,17 +53,17 @@ fn write_inputs(folder: &Path, shapes: &[Arc<Shape>], courses: &Courses) {
     std::fs::write(folder.join("poses.bin"), bytes).unwrap();
 }
 
-/// What one job yields.
+/// The result of one job.
 pub struct Found {
     pub touches: bool,
     /// An interval that holds the distance, metres.
     pub gap_m: [f64; 2],
     contacts: usize,
-    /// Work units, of ours.
+    /// Work units; only our library counts them.
     pub units: u64,
 }
 
-/// Ours, cold: nothing of one pair serves another but memory that was touched before.
+/// Our library, cold: nothing is reused from pair to pair except allocated memory.
 #[derive(Default)]
 pub struct Ours {
     store: FrontStore,
@@ -75,7 +76,7 @@ impl Ours {
         self.ask_in_slices(a, b, rel, goal, u64::MAX, &mut meter)
     }
 
-    /// The same in turns of so many units, by a meter that stays open.
+    /// The same in slices of this many units, with one meter for all slices.
     pub fn ask_in_slices(
         &mut self,
         a: &Shape,
@@ -99,7 +100,8 @@ impl Ours {
         }
     }
 
-    /// From the first to the second at the nearest points of the last question, unit, the first's frame.
+    /// Normal from the first body to the second at the nearest points of the last query, unit length, in the first's
+    /// frame.
     pub fn normal(&self) -> Option<Vec3> {
         self.front.witness().map(|leaf| leaf.closest.normal)
     }
@@ -162,7 +164,7 @@ pub fn run(shapes: &[Arc<Shape>], folder: &Path) {
     let meshes: Vec<TriMesh> = shapes.iter().map(|shape| theirs(shape)).collect();
     let mut ours = Ours::default();
     let mut csv = String::from("pair,library,job,ns,touches,gap_min_m,gap_max_m,contacts\n");
-    // Once round without a row: memory and caches are then as the others have them.
+    // One round is not recorded: it brings memory and caches into the same state as in the other libraries.
     let mut every: Vec<(usize, Pose, bool)> = Vec::new();
     for pair in 0..PAIRS {
         let [a, b] = courses.poses(pair);
@@ -171,8 +173,7 @@ pub fn run(shapes: &[Arc<Shape>], folder: &Path) {
         let touches = ours.ask(one, other, &rel, Goal::Verdict).touches;
         every.push((pair, rel, touches));
     }
-    // One library after the other, as those in C++ are: what parry walks through would have pushed ours out of the
-    // caches.
+    // One library completes before the next starts, as in C++: parry's traversal would evict our data from the caches.
     let clock = SystemClock;
     for library in ["sweepd", "parry3d-f64"] {
         for &(pair, rel, touches) in &every {

@@ -1,8 +1,8 @@
-//! Approximate contacts: how good the regions of a pair are that was cut off at a share of its work.
+//! Approximate contacts: the quality of the regions of a pair whose work was cut off at a share of its total.
 //!
-//! Pairs of bumpy spheres of 19,880 triangles, each alone and cold, overlapping by 0.25, 2.5 and 20 % of the diameter
-//! from where they first touch, in random places. Against every point that the two surfaces share (all triangles
-//! against all, `tests/oracle/shared.rs`), and against the exact manifold.
+//! Pairs of bumpy spheres of 19,880 triangles, each alone and cold, in random directions, overlapping by 0.25, 2.5 and
+//! 20 % of the diameter measured from first contact. References: every point that the two surfaces share (all triangles
+//! against all, `tests/oracle/shared.rs`), and the exact manifold.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -26,10 +26,10 @@ use crate::oracle::shared::crossings;
 use crate::stage::{DIAMETER_M, body, scene};
 
 const SEED: u64 = 29;
-/// Overlaps, share of the diameter, and pairs of each.
+/// Overlaps, as a share of the diameter, and the number of pairs for each.
 const OVERLAPS: [f64; 3] = [0.0025, 0.025, 0.2];
 const SHARES: [u64; 6] = [0, 5, 10, 25, 50, 100];
-/// Tests of a pair's own that are tried at a quarter of the work.
+/// Values of the region tests per pair that are compared at a quarter of the work.
 const TESTS: [u32; 3] = [0, 16, REGION_TESTS_PER_PAIR];
 
 const WANTED: Wanted = Wanted {
@@ -39,7 +39,7 @@ const WANTED: Wanted = Wanted {
     order: Order::Counted,
 };
 
-/// One pair in a world of its own.
+/// One pair in its own world.
 struct Alone {
     world: RefCell<World>,
     pairs: PairSet,
@@ -94,10 +94,10 @@ impl Alone {
         }
     }
 
-    /// A cold start cut off after so many units; returns what the narrow phase then knows, and the units spent.
+    /// A cold start that is cut off after so many units; returns the narrow phase and the units spent.
     fn cut_off(&self, units: Option<u64>) -> (Narrow, u64) {
         let mut narrow = Narrow::new(16);
-        // Meshes that deform are refitted out of what is spent; there are none here.
+        // Refits of deforming meshes would spend part of the units; there are none here.
         let mut world = self.world.borrow_mut();
         narrow.begin(1, &world, &self.pairs, &self.delta);
         narrow.widen(&world, &mut self.pairs.clone());
@@ -109,7 +109,7 @@ impl Alone {
     }
 }
 
-/// What was found at one share of the work.
+/// Results at one share of the work.
 #[derive(Default)]
 struct Tally {
     points: u64,
@@ -126,7 +126,7 @@ struct Tally {
     count: u64,
 }
 
-/// Shares of the diameter and angles are kept as whole millionths.
+/// Converts a share of the diameter or an angle to whole millionths.
 pub fn millionths(x: f64) -> u64 {
     #[allow(
         clippy::cast_possible_truncation,
@@ -141,7 +141,7 @@ struct Case {
     alone: Alone,
     work: u64,
     shared: Vec<Point>,
-    /// Middle and normal.
+    /// Middle and normal of each contact.
     contacts: Vec<(Point, Vec3)>,
 }
 
@@ -150,7 +150,7 @@ impl Tally {
         let (mut narrow, _) = case.alone.cut_off(Some(units));
         let (clock, world) = (SystemClock, case.alone.world.borrow());
         let mut took_ns = 0;
-        // The second time it allocates nothing.
+        // The second run is the measured one; it allocates nothing.
         for _ in 0..2 {
             let start_ns = clock.monotonic_ns();
             if tests > 0 {
@@ -212,7 +212,7 @@ impl Tally {
     }
 }
 
-/// A pair that overlaps by a share of the diameter from where it first touches on the way in.
+/// A pair that has moved by `overlap` (share of the diameter) beyond its first contact on the way in.
 fn case(shapes: &[Arc<Shape>], overlap: f64, random: &mut Random) -> Case {
     let mut vector = |size: f64| {
         Vec3::new(
@@ -262,7 +262,7 @@ fn case(shapes: &[Arc<Shape>], overlap: f64, random: &mut Random) -> Case {
     }
 }
 
-/// Every point that the surfaces share, A's frame.
+/// Every point that the surfaces share, in A's frame.
 fn shared(shapes: [&Arc<Shape>; 2], rel: &Pose) -> Vec<Point> {
     let placed = [(shapes[0], Pose::identity()), (shapes[1], *rel)].map(|(shape, pose)| {
         let Geometry::Mesh(mesh) = &shape.geometry else {

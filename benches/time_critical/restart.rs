@@ -1,5 +1,5 @@
-//! The baseline that keeps nothing but, on request, the triangles that touched last: every tick each pair's search
-//! starts again from the roots, at the tick's poses.
+//! The baseline: each pair's search restarts from the roots in every tick, at the tick's poses. It keeps no state but,
+//! if requested, the triangles that touched last.
 
 use sweepd::math::{Interval, Pose};
 use sweepd::narrow::mesh::{CarriedFront, FrontStore, Goal, Search, Walk, retest_witness};
@@ -8,14 +8,14 @@ use sweepd::time::Meter;
 
 use crate::stage::{PAIRS, Stage};
 
-/// Node tests of a pair's turn, as in the engine.
+/// Node tests per slice of a pair, as in the engine.
 const SLICE_UNITS: u64 = 32;
 
-/// One search for each pair.
+/// The search of each pair.
 pub enum Trees {
-    /// Over the boxes in the bodies' frames.
+    /// Over axis-aligned boxes in the bodies' frames.
     Walks(Vec<Walk>),
-    /// Over the oriented boxes, in the engine's own order for verdicts.
+    /// Over oriented boxes, in the engine's order for verdicts.
     Fronts(Vec<CarriedFront>, Box<FrontStore>),
 }
 
@@ -38,7 +38,7 @@ impl Trees {
         }
     }
 
-    /// One turn; whether there is a verdict.
+    /// Runs one slice; returns whether there is a verdict.
     fn advance(&mut self, pair: usize, [a, b]: [&Shape; 2], meter: &mut Meter<'_>) -> bool {
         let goal = Goal::Verdict;
         match self {
@@ -70,16 +70,16 @@ pub struct Restart {
     trees: Trees,
     witnesses: Vec<Option<(u32, u32)>>,
     cached: bool,
-    /// The pair's search has begun in this tick.
+    /// Per pair: whether its search has begun in this tick.
     started: Vec<bool>,
-    /// Verdict at this tick's poses: colliding, apart, or unknown.
+    /// Per pair: verdict at this tick's poses; `Some(true)` colliding, `Some(false)` apart, `None` unknown.
     pub verdicts: Vec<Option<bool>>,
     /// Ticks since the last verdict.
     ages: Vec<u64>,
 }
 
 impl Restart {
-    /// * `cached` - last tick's witness is asked first.
+    /// * `cached` - whether last tick's witness is tested first.
     pub fn new(trees: Trees, cached: bool) -> Self {
         Self {
             trees,
@@ -132,7 +132,7 @@ impl Restart {
         }
     }
 
-    /// What is known of a pair's gap at this tick's poses.
+    /// The known interval of a pair's gap at this tick's poses.
     pub fn gap(&self, pair: usize) -> Interval {
         if self.verdicts[pair] == Some(true) {
             Interval::new(f64::NEG_INFINITY, 0.0)

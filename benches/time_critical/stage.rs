@@ -1,4 +1,4 @@
-//! Two hundred pairs of meshes that move, driven through the rooms by hand: world, broad phase, narrow phase.
+//! Two hundred pairs of moving meshes, with world, broad phase and narrow phase called by hand.
 
 use std::sync::Arc;
 
@@ -18,11 +18,11 @@ use sweepd::world::{Parts, PlacedShape, World};
 
 use crate::common::row;
 
-/// Pairs of bodies; each pair stands by itself.
+/// Pairs of bodies; each pair is far from the others.
 pub const PAIRS: usize = 200;
-/// Two thirds of them begin in contact.
+/// Pairs that touch at the start: two thirds.
 const TOUCHING: usize = 133;
-/// Diameter of a body but for its bumps, metres.
+/// Diameter of a body without its bumps, metres.
 pub const DIAMETER_M: f64 = 2.0;
 
 /// A bumpy sphere of 19,880 triangles.
@@ -55,7 +55,7 @@ fn bumpy(kind: usize) -> Mesh {
     Mesh::new(vertices, faces, None).unwrap()
 }
 
-/// A scene of these bodies, all of one source.
+/// A scene of these bodies, all with one source.
 pub fn scene(bodies: Vec<BodySpec>) -> Scene {
     Scene {
         frame_id: "world".to_owned(),
@@ -71,7 +71,7 @@ pub fn scene(bodies: Vec<BodySpec>) -> Scene {
     }
 }
 
-/// Built once: their trees take a while.
+/// The shapes, built once because building their trees takes long.
 pub fn shapes() -> Vec<Arc<Shape>> {
     let shape = |mesh: Mesh| Shape {
         aabb: mesh.aabb(),
@@ -82,7 +82,7 @@ pub fn shapes() -> Vec<Arc<Shape>> {
     (0..4).map(|kind| Arc::new(shape(bumpy(kind)))).collect()
 }
 
-/// How one pair moves: B about A, between two distances, turning.
+/// The motion of one pair: B moves about A, between two distances, and turns.
 struct Course {
     a: Pose,
     away: Vec3,
@@ -93,18 +93,19 @@ struct Course {
     turn: Quat,
 }
 
-/// How all pairs move.
+/// The motion of all pairs.
 pub struct Courses(Vec<Course>);
 
 impl Courses {
-    /// * `percent` - motion of a surface point a tick, percent of the diameter; each pair 0.2 to 3 times that.
+    /// * `percent` - motion of a surface point per tick, percent of the diameter; individual pairs move 0.2 to 3
+    ///   times that.
     pub fn new(percent: f64, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let all = (0..PAIRS).map(|k| course(k, percent, &mut random));
         Self(all.collect())
     }
 
-    /// One tick.
+    /// Advances by one tick.
     pub fn advance(&mut self) {
         for course in &mut self.0 {
             course.distance += course.speed;
@@ -123,7 +124,7 @@ impl Courses {
         [self.0[k].a, self.0[k].b()]
     }
 
-    /// A frame of all bodies: two a pair, ids from 1.
+    /// A frame of all bodies: two per pair, ids from 1.
     pub fn rows(&self) -> impl Iterator<Item = TransformRow> {
         (0_u64..)
             .zip(&self.0)
@@ -131,7 +132,7 @@ impl Courses {
     }
 }
 
-/// All bodies with their shapes: the two of a pair have different ones.
+/// All bodies with their shapes; the two bodies of a pair have different shapes.
 pub fn bodies(shapes: &[Arc<Shape>]) -> (Scene, Vec<Parts>) {
     let scene = scene((0..2 * PAIRS).map(|k| body(k as u64 + 1)).collect());
     let placed = (0..2 * PAIRS).map(|k| {
@@ -142,7 +143,7 @@ pub fn bodies(shapes: &[Arc<Shape>]) -> (Scene, Vec<Parts>) {
     (scene, placed.collect())
 }
 
-/// The scene, its rooms, and its motion.
+/// The scene, its modules (world, broad phase, narrow phase), and its motion.
 pub struct Stage {
     pub world: World,
     pub pairs: PairSet,
@@ -157,14 +158,15 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// * `percent` - motion of a surface point a tick, percent of the diameter; each pair 0.2 to 3 times that.
+    /// * `percent` - motion of a surface point per tick, percent of the diameter; individual pairs move 0.2 to 3
+    ///   times that.
     pub fn new(shapes: &[Arc<Shape>], percent: f64, seed: u64) -> Self {
         Self::reporting(shapes, percent, seed, 0.0)
     }
 
-    /// As `new`, at the same poses.
+    /// As `new`, with the same poses.
     ///
-    /// * `within_m` - pairs nearer than this are reported: their bounds are worked on when the verdicts are there.
+    /// * `within_m` - pairs nearer than this are reported: their bounds are refined once all verdicts are known.
     pub fn reporting(shapes: &[Arc<Shape>], percent: f64, seed: u64, within_m: f64) -> Self {
         let (mut scene, placed) = bodies(shapes);
         for body in &mut scene.bodies {
@@ -188,13 +190,13 @@ impl Stage {
         stage
     }
 
-    /// Moves every pair by one tick and lets the rooms before the narrow phase follow.
+    /// Moves every pair by one tick and updates world and broad phase.
     pub fn advance(&mut self) {
         self.courses.advance();
         self.admit();
     }
 
-    /// Starts the narrow phase of this tick; returns how long its motion pass took, nanoseconds.
+    /// Starts the narrow phase of this tick; returns the duration of its motion pass, nanoseconds.
     pub fn begin(&mut self) -> u64 {
         let from_ns = self.clock.monotonic_ns();
         self.narrow
@@ -203,7 +205,7 @@ impl Stage {
         self.clock.monotonic_ns() - from_ns
     }
 
-    /// Forgets all that the narrow phase knows: this tick starts cold.
+    /// Discards the state of the narrow phase, so that this tick starts cold.
     pub fn make_cold(&mut self) {
         self.narrow = Narrow::new(16);
         self.delta.clear();
@@ -220,14 +222,14 @@ impl Stage {
         [0, 1].map(|k| &*self.shapes[(pair + k) % self.shapes.len()])
     }
 
-    /// The pair that a slot of the pair set holds.
+    /// The pair at a slot of the pair set.
     pub fn pair_of(&self, slot: PairSlot) -> usize {
         let (low, _) = self.pairs.get(slot).unwrap().slots();
         let id = self.world.body(low).unwrap().id.0;
         usize::try_from((id - 1) / 2).unwrap()
     }
 
-    /// Which pairs truly collide at this tick's poses: walks to the end over the other trees, nothing carried over.
+    /// Which pairs collide at this tick's poses: complete walks over the other trees, without state from earlier ticks.
     pub fn truth(&self, walk: &mut Walk) -> Vec<bool> {
         (0..PAIRS)
             .map(|pair| {
@@ -292,7 +294,7 @@ fn course(k: usize, percent: f64, random: &mut Random) -> Course {
         (home + vector(0.5)).into(),
         Quat::from_scaled_axis(vector(3.0)),
     );
-    // Near a diagonal the boxes overlap wherever the bodies are.
+    // Near a diagonal direction the boxes overlap at any distance that occurs.
     let away = (Vec3::new(1.0, 1.0, 1.0) + vector(0.3)).normalize();
     let turn = Quat::from_scaled_axis(vector(3.0));
     let spin = vector(1.0).normalize();
@@ -319,7 +321,7 @@ fn course(k: usize, percent: f64, random: &mut Random) -> Course {
 }
 
 pub fn body(id: u64) -> BodySpec {
-    // What is built is handed over beside the scene.
+    // The built shapes are passed separately.
     let shape = PlacedSpec {
         shape: ShapeSpec::Sphere { radius: 1.0 },
         pose: Pose::identity(),

@@ -1,4 +1,4 @@
-//! What is measured: the engine's narrow phase by its search, or a baseline of the bench's own.
+//! The methods that are measured: the engine's narrow phase with its searches, and the baselines of this bench.
 
 use sweepd::ids::PairSlot;
 use sweepd::math::Interval;
@@ -11,7 +11,7 @@ use crate::regions::millionths;
 use crate::restart::{Restart, Trees};
 use crate::stage::{DIAMETER_M, PAIRS, Stage};
 
-/// Verdicts, and nothing else.
+/// Demand for verdicts only.
 pub const VERDICTS: Wanted = Wanted {
     contacts: false,
     bounds: false,
@@ -19,8 +19,9 @@ pub const VERDICTS: Wanted = Wanted {
     order: Order::Aged,
 };
 
-/// The engine's searches (its `restart` keeps each pair's certificate and last touch); and plain restarts: each pair
-/// anew every tick, over oriented boxes or over boxes in the bodies' frames, with and without last tick's witness.
+/// The engine's searches (its `restart` keeps each pair's certificate and last contact), and plain restarts: each pair
+/// from the start in every tick, over oriented boxes or over boxes in the bodies' frames, with and without last tick's
+/// witness.
 pub const SUBJECTS: [&str; 8] = [
     "carried",
     "restart",
@@ -49,7 +50,7 @@ impl Subject {
         }
     }
 
-    /// Whether it goes on with bounds when it has the verdicts.
+    /// Whether the method continues with bounds once it has the verdicts.
     pub fn has_bounds(name: &str) -> bool {
         Search::named(name).is_some()
     }
@@ -83,8 +84,8 @@ impl Subject {
         }
     }
 
-    /// How wide the interval of each pair's distance is after a cold start, millionths of the diameter. Without any
-    /// work on the pair it is that of the bodies' boxes.
+    /// The width of each pair's distance interval after a cold start, millionths of the diameter. For a pair without
+    /// any work it is the interval from the bodies' boxes.
     pub fn widths(&self, stage: &Stage) -> Vec<u64> {
         let distance = |gap: Interval| gap.max.max(0.0) - gap.min.max(0.0);
         let width = |(slot, _)| {
@@ -98,8 +99,8 @@ impl Subject {
         stage.pairs.iter().map(width).collect()
     }
 
-    /// How far work came on each pair that is open: radius of the largest sphere in which it may touch, from the boxes
-    /// that are not proved apart, millionths of the diameter. None of a plain restart's.
+    /// Progress on each open pair: radius of the largest sphere in which it may touch, from the boxes that are not
+    /// proved apart, millionths of the diameter. Empty for a plain restart.
     pub fn regions(&self, stage: &mut Stage) -> Vec<u64> {
         if matches!(self, Self::Restart(_)) {
             return Vec::new();

@@ -1,15 +1,15 @@
-//! One row of the table: a cell for each column, empty where a case has none; and the limits that rows are told under.
+//! One row of the table: a cell for each column, empty if the case has no such value; and the limits of the rows.
 
 use std::fmt::{self, Display, Formatter};
 
 use sweepd::time::{Clock, Meter};
 
-/// Columns behind those that say where a figure comes from, and the method; new ones come last.
+/// Columns after those of the origin and the method; new columns are appended.
 ///
-/// Shares: `unresolved`, `unconfirmed` and `guess_error` of all pairs, `false_alarm` of the pairs truly apart.
-/// `width`: of the interval of the distance, an overlap counting as 0, all pairs; `region`: radius of the largest
-/// sphere in which an open pair may touch, open pairs alone; both as a share of the diameter. `onsets`: contacts that
-/// began, and those of them that were never reported, which the delays leave out.
+/// Shares: `unresolved`, `unconfirmed` and `guess_error` of all pairs, `false_alarm` of the pairs that are apart.
+/// `width`: of the distance interval, all pairs, with an overlap counted as 0; `region`: radius of the largest sphere
+/// in which an open pair may touch, open pairs only; both as a share of the diameter. `onsets`: contacts that began,
+/// and the number of them never reported, which the delays exclude.
 pub const COLUMNS: [&str; 27] = [
     "case",
     "motion_percent",
@@ -48,7 +48,7 @@ impl Row {
         Self(vec![String::new(); COLUMNS.len()]).put("case", case)
     }
 
-    /// The same with one more cell.
+    /// Returns the row with one more cell.
     pub fn put(mut self, column: &str, cell: impl Display) -> Self {
         let at = COLUMNS.iter().position(|known| *known == column);
         self.0[at.unwrap()] = cell.to_string();
@@ -60,7 +60,7 @@ impl Row {
     }
 }
 
-/// What a tick may spend: anything, microseconds, or work units (which no other load disturbs).
+/// Limit of a tick: none, microseconds, or work units (which other load on the machine does not affect).
 #[derive(Clone, Copy)]
 pub enum Limit {
     None,
@@ -76,7 +76,7 @@ impl Limit {
         }
     }
 
-    /// A meter that starts at `from_ns`, monotonic.
+    /// A meter that starts at `from_ns`, monotonic clock.
     pub fn meter(self, clock: &dyn Clock, from_ns: u64) -> Meter<'_> {
         let units = match self {
             Self::Units(units) => Some(units),
@@ -100,12 +100,12 @@ pub fn us(ns: u64) -> f64 {
     ns as f64 / 1e3
 }
 
-/// Microseconds, as they are told.
+/// Nanoseconds as text, microseconds.
 pub fn tenths(ns: u64) -> String {
     format!("{:.1}", us(ns))
 }
 
-/// A share in percent, as it is told.
+/// A share as text, percent.
 pub fn percent_of(part: u64, whole: u64) -> String {
     format!("{:.2}", 100.0 * part as f64 / whole.max(1) as f64)
 }

@@ -1,4 +1,4 @@
-//! Verdicts against the truth, pair by pair and tick by tick.
+//! Comparison of verdicts with the truth, per pair and tick.
 
 use crate::common::quantile;
 use crate::stage::PAIRS;
@@ -6,7 +6,7 @@ use crate::table::{Row, percent_of};
 
 #[derive(Default)]
 pub struct Tally {
-    /// Pairs without a verdict, all ticks together.
+    /// Pairs without a verdict, summed over all ticks.
     pub unresolved: u64,
     pair_ticks: u64,
     apart: u64,
@@ -36,7 +36,7 @@ impl Tally {
         }
     }
 
-    /// * `verdicts` - `None`: unresolved.
+    /// * `verdicts` - per pair: whether it collides; `None`: unresolved.
     pub fn compare(&mut self, tick: u64, truth: &[bool], verdicts: &[Option<bool>]) {
         for pair in 0..PAIRS {
             let (collides, verdict) = (truth[pair], verdicts[pair]);
@@ -76,7 +76,7 @@ impl Tally {
         1.0 - self.unresolved as f64 / self.pair_ticks as f64
     }
 
-    /// Adds what a single tick can tell.
+    /// Adds the figures that a single tick yields.
     pub fn tell(&self, row: Row) -> Row {
         row.put(
             "unresolved_percent",
@@ -93,7 +93,7 @@ impl Tally {
         .put("wrong", self.wrong)
     }
 
-    /// Adds what takes a run of many ticks.
+    /// Adds the figures that need a run of many ticks.
     pub fn tell_run(&mut self, row: Row) -> Row {
         let pending = self.begun.iter().flatten().count() as u64;
         let row = self

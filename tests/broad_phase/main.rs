@@ -1,7 +1,8 @@
-//! Goal: every broad phase gives, in every tick, the pairs and the delta that the law asks for.
+//! Goal: every broad phase gives, in every tick, exactly the pairs and the delta that its specification requires.
 //!
-//! Method: an oracle that looks at every pair in every tick (`world.rs`) runs beside every method on the same seeded
-//! changes; pairs, slots, delta, truncated bodies and counts are compared in each tick, and each structure validated.
+//! Method: an oracle that tests every pair in every tick (`oracle.rs`) runs with every method on the same seeded
+//! changes. Pairs, slots, delta, truncated bodies and counts are compared in each tick, and each structure is
+//! validated.
 
 #![allow(
     clippy::unwrap_used,
@@ -36,7 +37,7 @@ fn run(
     run_short(ticks, bodies, (limit, 1 << 16), setup, step)
 }
 
-/// The same with a limit of pairs, and of those that are counted anew in each tick.
+/// The same with a limit of pairs, and a number of pairs up to which all are recounted in each tick.
 fn run_short(
     ticks: usize,
     bodies: usize,
@@ -60,7 +61,7 @@ fn run_short(
     all
 }
 
-/// All bodies in, boxes at random in a cube.
+/// Inserts all bodies, with boxes at random positions in a cube.
 fn scatter(world: &mut World, reach: f64, half: f64) {
     for i in 0..world.bodies.len() {
         let centre = world.random_vec(reach);
@@ -130,7 +131,7 @@ fn a_clump_on_a_floor_gives_equal_pairs() {
             let jitter = w.random_vec(0.002);
             w.shift(i, [jitter[0] * 5.0, jitter[1] * 5.0, jitter[2]]);
         }
-        // All move, so nobody keeps lists of the pairs of single bodies when the one with the most leaves.
+        // All bodies move, so no list of the pairs of single bodies is kept when the body with the most pairs leaves.
         match tick % 50 {
             20 => w.remove(0, EndCause::Removed),
             23 => w.insert(0),
@@ -162,7 +163,7 @@ fn an_axis_is_skipped_while_all_stand_on_a_floor_and_kept_again_after() {
             if w.rng.once_in(50) {
                 w.insert(i);
             }
-            // Later all gather in a tower, where the two other axes are the clumped ones.
+            // Later all bodies gather in a tower, where they are clumped on the two other axes.
             if tick > 150 && w.rng.once_in(20) {
                 let centre = w.bodies[i].aabb.centre().coords;
                 let up = (i as f64) * 0.9;

@@ -1,4 +1,4 @@
-//! An oracle that knows no method: it looks at every pair in every tick.
+//! An oracle that is independent of the methods: it tests every pair in every tick.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,10 +9,10 @@ use sweepd::wire::EndCause;
 use crate::world::World;
 
 type Ids = (BodyId, BodyId);
-/// Two bodies by their places in the world.
+/// Two bodies by their indices in the world.
 type Pair = (usize, usize);
 
-/// What a tick must have done, by ids.
+/// The required result of a tick, by ids.
 #[derive(Debug, Default, PartialEq)]
 pub struct Outcome {
     pub began: Vec<Ids>,
@@ -22,19 +22,19 @@ pub struct Outcome {
     pub missing: u64,
 }
 
-/// The law of the broad phase in its plainest words.
+/// The specification of the broad phase in its simplest form.
 #[derive(Default)]
 pub struct Oracle {
     stored: BTreeSet<Pair>,
     truncated: BTreeSet<usize>,
     pub missing: u64,
-    /// Pairs, stored and missing, that are counted anew in each tick.
+    /// Up to this number of pairs, stored and missing, all are recounted in each tick.
     recount: u64,
-    /// Pairs that were stored and missing when they were last counted, and ticks since.
+    /// The number of stored and missing pairs at the last count, and the ticks since then.
     counted: (u64, u64),
-    /// A body that misses pairs moved, left or was edited since, or the forced pairs are others.
+    /// Since the last count a body with missing pairs moved, left or was edited, or the forced pairs changed.
     stirred: bool,
-    /// Ticks in which what was missing was not counted; and in which it was after such.
+    /// Number of ticks in which missing pairs were not counted, and of ticks with a count after such ticks.
     pub waited: (u64, u64),
 }
 
@@ -43,7 +43,7 @@ fn ids(world: &World, (a, b): Pair) -> Ids {
     (a.min(b), a.max(b))
 }
 
-/// Whether something else than the boxes keeps it.
+/// Whether a pair is stored regardless of its boxes.
 fn always(world: &World, (a, b): Pair) -> bool {
     let key = PairKey::new(World::slot(a), World::slot(b));
     world.bodies[a].unbounded || world.bodies[b].unbounded || world.forced.contains(&key)
@@ -63,7 +63,7 @@ fn keeps(world: &World, (a, b): Pair) -> bool {
     world.bodies[a].keeps || world.bodies[b].keeps
 }
 
-/// Pairs that are to be stored.
+/// Pairs that must be stored.
 fn wanted(world: &World) -> impl Iterator<Item = Pair> + '_ {
     let n = world.bodies.len();
     (0..n)
@@ -110,7 +110,7 @@ impl Oracle {
         }
         let mut begin: Vec<Pair> = wanted(world)
             .filter(|p| !self.stored.contains(p))
-            // What two such bodies miss nobody knows before it is counted.
+            // Missing pairs of two such bodies are not found before the next count.
             .filter(|p| !(waits && self.misses(*p)))
             .collect();
         begin.sort_by_key(|p| ids(world, *p));
@@ -118,7 +118,7 @@ impl Oracle {
         let (fit, rest) = begin.split_at(room.min(begin.len()));
         self.stored.extend(fit);
         self.miss(world, rest, waits);
-        // Whatever is counted when: a pair that is not there is of two bodies that are known to miss some.
+        // Whenever pairs are counted: each pair that is not stored belongs to two bodies marked as truncated.
         assert!(wanted(world).all(|p| self.stored.contains(&p) || self.misses(p)));
         outcome.began = fit.iter().map(|p| ids(world, *p)).collect();
         outcome.ended.sort_by_key(|(ids, _)| *ids);
@@ -128,12 +128,12 @@ impl Oracle {
         outcome
     }
 
-    /// Whether both of a pair are known to miss some.
+    /// Whether both bodies of a pair are marked as truncated.
     fn misses(&self, (a, b): Pair) -> bool {
         self.truncated.contains(&a) && self.truncated.contains(&b)
     }
 
-    /// Whether what was missing is not counted in this tick.
+    /// Whether missing pairs are not counted in this tick.
     fn waits(&mut self, world: &World, limit: usize, room: usize) -> bool {
         self.counted.1 += 1;
         let told = world.changes.moved.iter().chain(&world.changes.requery);
@@ -147,7 +147,7 @@ impl Oracle {
         !counts && self.truncated.iter().any(|b| world.bodies[*b].inside)
     }
 
-    /// Takes the pairs that found no room.
+    /// Marks the bodies of the pairs for which there was no room, and updates the counts.
     fn miss(&mut self, world: &World, rest: &[Pair], waits: bool) {
         let was = std::mem::take(&mut self.truncated);
         self.truncated

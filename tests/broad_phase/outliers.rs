@@ -1,5 +1,5 @@
 //! A few bodies far from all others (a tracker that lost its target, a part parked out of the way), or two groups far
-//! from each other, must not make the search among the others dearer: work is counted, and pairs compared.
+//! from each other, must not make the search among the others slower: work is counted, and pairs are compared.
 
 use sweepd::broad::{BroadPhase, Method};
 use sweepd::pairs::{PairDelta, PairSet};
@@ -10,7 +10,7 @@ use crate::world::{World, at};
 const BODIES: usize = 4_000;
 const TICKS: usize = 60;
 
-/// Boxes compared in all ticks, and pairs after the last one.
+/// Returns the boxes compared in all ticks, and the number of pairs after the last one.
 fn play(
     method: Method,
     centres: impl Fn(usize, [f64; 3]) -> [f64; 3],
@@ -59,7 +59,7 @@ fn bug_one_body_far_away_made_the_search_among_all_others_coarse() {
     for far in [1e4, 1e6, 1e9, 1e12] {
         let outlier = |i: usize, centre: [f64; 3]| if i == 7 { [far; 3] } else { centre };
         compare(&format!("one at {far:e} m"), 1.5, outlier);
-        // One in fifty, each elsewhere.
+        // One body in fifty, each at another place.
         let some = |i: usize, centre: [f64; 3]| {
             if i % 50 == 7 {
                 centre.map(|c| c * far / 10.0)
@@ -90,10 +90,10 @@ fn bug_a_crowd_that_came_beyond_the_array_of_a_few_was_compared_each_with_each()
     let mut world = World::new(5, BODIES);
     let mut broad = BroadPhase::new(Method::UniformGrid);
     let (mut pairs, mut delta) = (PairSet::new(NO_LIMIT), PairDelta::default());
-    // A few close together, and then all the others wherever.
+    // A few bodies close together, then all others in a larger region.
     for (bodies, reach) in [(0..100, 1.0), (100..BODIES, 10.0)] {
         for i in bodies {
-            // Boxes of one size to the last bit: a larger one has all laid out anew.
+            // Coordinates are rounded so that all boxes have exactly the same size: a larger box would cause a rebuild.
             let centre = world.random_vec(reach).map(|c| (c * 64.0).round() / 64.0);
             world.bodies[i].aabb = at(centre, [0.25; 3]);
             world.bodies[i].inside = true;

@@ -1,8 +1,8 @@
-//! Goal: of a crowd of more pairs than the set holds nothing is lost, whenever it is counted, and at rest it costs
-//! nothing.
+//! Goal: if a crowd has more pairs than the set holds, none is lost, whenever pairs are counted, and at rest the crowd
+//! costs nothing.
 //!
-//! Method: the oracle knows when missing pairs are counted, and holds in each tick that a pair that is not there is of
-//! two bodies that are marked; how many pairs a method told of is read off its work.
+//! Method: the oracle computes when missing pairs are counted, and asserts in each tick that each pair that is not
+//! stored belongs to two marked bodies. The number of pairs that a method reported is read from its work counters.
 
 use sweepd::broad::{BroadPhase, Method};
 use sweepd::ids::PairKey;
@@ -17,7 +17,7 @@ use crate::{run, run_short, scatter};
 fn pairs_beyond_the_limit_are_counted_marked_and_stored_when_there_is_room() {
     let setup = |w: &mut World| scatter(w, 2.0, 0.8);
     run(900, 40, 30, setup, |w, tick| {
-        // The crowd spreads and gathers, so that the limit is reached and left again and again.
+        // The crowd spreads and gathers, so that the limit is reached again and again.
         let factor = if tick / 25 % 2 == 0 { 1.05 } else { 0.95 };
         for i in 0..40 {
             let centre = w.bodies[i].aabb.centre() * factor;
@@ -47,7 +47,7 @@ fn a_crowd_far_beyond_the_limit_misses_pairs_of_marked_bodies_alone_and_all_are_
     };
     let ticks = 300;
     let all = run_short(3 * ticks, 40, (60, 25), setup, |w, tick| {
-        // It rests, goes apart by a few and wholly, comes back, is edited, leaves and comes.
+        // Phases: rest, partial and complete spreading, gathering, edits, bodies that leave and come.
         let phase = tick / 15 % 8;
         let ends = tick >= ticks - 30;
         let factor = if ends {
@@ -117,19 +117,19 @@ fn bug_a_crowd_at_rest_beyond_the_limit_was_told_of_from_both_sides_in_every_tic
             broad.update(&changes, &world, &world, &mut pairs, &mut delta);
             changes.clear();
             assert_eq!((pairs.len(), pairs.missing()), (100, all - 100));
-            // The first of all has all of its pairs.
+            // The first body has all of its pairs.
             assert_eq!(pairs.truncated().len(), n - 1);
             if broad.work().told > 0 {
                 told.push((tick, broad.work().told));
             }
-            // One of them has moved, and meets all as before.
+            // One body has moved, and overlaps all others as before.
             if tick == 30 {
                 changes.moved.push(World::slot(7));
             }
         }
-        // When they come; at rest no more; and once after the change.
+        // Pairs are reported when the bodies come, not at rest, and once after the move.
         assert_eq!(told, [(0, all), (31, all)]);
-        // Most of them leave: there is room, and it is used at once.
+        // Most bodies leave; the room is used in the same tick.
         let mut gone = ChangeSet::default();
         gone.removed.extend((15..n).map(|i| Removed {
             slot: World::slot(i),

@@ -1,4 +1,4 @@
-//! A world of boxes without bodies, and all methods beside the oracle.
+//! A world of boxes without shapes, and a bench of all methods and the oracle.
 
 use sweepd::broad::{BroadPhase, Method, Proxies};
 use sweepd::ids::{BodyId, BodySlot, PairKey};
@@ -10,7 +10,7 @@ use sweepd::world::{ChangeSet, Removed};
 use crate::common::Rng;
 use crate::oracle::{Oracle, Outcome};
 
-/// One body of the double.
+/// One body of this world.
 #[derive(Clone, Debug)]
 pub struct Body {
     pub inside: bool,
@@ -22,7 +22,7 @@ pub struct Body {
     pub keeps: bool,
 }
 
-/// Bodies, changes of the tick, forced pairs, and the generator that moves them.
+/// Bodies, changes of the tick, forced pairs, and the random generator of the motion.
 pub struct World {
     pub rng: Rng,
     pub bodies: Vec<Body>,
@@ -144,28 +144,29 @@ impl PairPolicy for World {
     }
 }
 
-/// One method with its own set.
+/// One method with its own pair set.
 struct Rig {
     method: Method,
-    /// Which ticks the order works from scratch, around the clock; nothing: as it chooses.
+    /// In which ticks the `Order` method works from scratch, repeated cyclically; empty: as the method chooses.
     gears: &'static [bool],
-    /// Goes on with the next method every third tick.
+    /// Whether it changes to the next method every third tick.
     changing: bool,
     broad: BroadPhase,
     pairs: PairSet,
     delta: PairDelta,
 }
 
-/// What a run went through, so that a test can say which paths it took.
+/// Counters of a run, so that a test can assert which code paths it took.
 #[derive(Debug, Default)]
 pub struct Summary {
     pub ticks: u64,
     pub pairs: usize,
     pub swaps: u64,
     pub rebuilds: u64,
-    /// Ticks with an axis skipped.
+    /// Ticks in which an axis was skipped.
     pub skipped: u64,
-    /// Ticks in which missing pairs were not counted, and in which they were after such; missing pairs at the end.
+    /// Ticks in which missing pairs were not counted, and ticks with a count after such ticks; missing pairs at the
+    /// end.
     pub waited: (u64, u64),
     pub missing: u64,
 }
@@ -192,7 +193,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// * `recount` - missing pairs of more than so many are not counted in each tick.
+    /// * `recount` - up to this number of pairs, missing ones are counted in each tick.
     pub fn new(limit: usize, recount: u64) -> Self {
         let rig = |method, gears| Rig {
             method,
@@ -206,7 +207,7 @@ impl Bench {
             .iter()
             .map(|(method, _)| rig(*method, &[][..]))
             .collect();
-        // The ways of the order, whatever it would choose.
+        // The modes of `Order`, regardless of its own choice.
         rigs.push(rig(Method::Order, &[true]));
         rigs.push(rig(Method::Order, &[true, true, false, true, false]));
         rigs.push(Rig {
@@ -224,7 +225,7 @@ impl Bench {
         }
     }
 
-    /// Runs one tick in every method and compares everything; then empties the changes.
+    /// Runs one tick with every method and compares all results; then clears the changes.
     pub fn tick(&mut self, world: &mut World, what: &str) {
         let expected = self.oracle.tick(world, self.limit);
         self.seen.ticks += 1;

@@ -1,8 +1,8 @@
-//! Goal: a world of very many bodies, whose way of working gives back the memory of the other way, stays exact when it
-//! changes from one to the other and back; and begins with the way that suits it.
+//! Goal: a world of very many bodies, in which each mode of working frees the memory of the other, stays exact when the
+//! mode changes in either direction; and starts in the mode that suits it.
 //!
-//! Method: 40,000 bodies that move, stand still, move again; or hardly move at all; and 1,000 of which each overlaps
-//! dozens. What each tick did is read off its work.
+//! Method: 40,000 bodies that move, stop and move again, or hardly move at all; and 1,000 bodies that overlap dozens of
+//! others each. The mode of each tick is read from the work counters.
 
 use sweepd::simd::boxes::Level;
 use sweepd::wire::{BroadCause, BroadMode};
@@ -13,7 +13,7 @@ use crate::scenes::{Kind, Scene};
 
 const BODIES: usize = 40_000;
 
-/// Ticks with a scene that goes on or stands still; returns the ways they took.
+/// Runs ticks in which the scene moves or stands still; returns their modes.
 fn frames(rig: &mut Rig, scene: &mut Scene, count: usize, moving: bool) -> Vec<BroadMode> {
     let way = |frame: usize| {
         if moving {

@@ -1,11 +1,11 @@
-//! Goal: every broad phase gives the exact pairs and events in every scene class of the bench, the main one with every
-//! set of vector instructions and with several threads, through churn of everything, and in the two cases that once
-//! gave double pairs.
+//! Goal: every broad phase gives the exact pairs and events in every scene class of the bench: the main method with
+//! every set of vector instructions and with several threads, with churn of all bodies, and in the two cases that once
+//! gave duplicate pairs.
 //!
-//! Method: the bench's scenes at 2,000 bodies; in each frame the pair set is compared with an exact set found another
-//! way (strips and a sweep), and the events with the difference of two such sets. 2,000 frames a scene in release, 60
-//! otherwise; `SWEEPD_FRAMES` sets another number. The soak runs 20 minutes: `cargo test --release --test broad_scenes
-//! -- --ignored`, `SWEEPD_SOAK_S` sets its seconds.
+//! Method: the bench's scenes at 2,000 bodies. In each frame the pair set is compared with an exact set found by
+//! another method (strips and a sweep), and the events with the difference of two such sets. 2,000 frames per scene in
+//! release, 60 otherwise; `SWEEPD_FRAMES` sets another number. The soak runs 20 minutes: `cargo test --release --test
+//! broad_scenes -- --ignored`, `SWEEPD_SOAK_S` sets its seconds.
 
 #![allow(
     missing_docs,
@@ -45,7 +45,7 @@ fn frames() -> usize {
     told.map_or(usual, |frames| frames.parse().unwrap())
 }
 
-/// One rig a level of instructions, and one a method, over one scene; every frame exact in all.
+/// Runs one scene with one rig per instruction level and one per method; every frame must be exact in all of them.
 fn run(kind: Kind, bodies: usize, frames: usize) {
     let mut scene = Scene::new(kind, bodies, 11);
     let mut rigs: Vec<Rig> = Level::available()
@@ -112,12 +112,11 @@ scenes_are_exact! {
 
 #[test]
 fn a_heap_is_exact() {
-    // Every body of the heap meets every other: few frames show all there is.
+    // Every body of the heap overlaps every other, so few frames suffice.
     run(Kind::Heap, 400, frames() / 10 + 10);
 }
 
-/// What the main method does in all frames of a scene: sorts of everything, boxes compared; and the pairs of all
-/// frames.
+/// Work of the main method in all frames of a scene: full sorts, boxes compared; and the number of pairs of all frames.
 fn work(kind: Kind, bodies: usize, frames: usize) -> (u64, u64, u64) {
     let mut scene = Scene::new(kind, bodies, 11);
     let mut rig = Rig::new(Level::best(), bodies, false);
@@ -193,11 +192,12 @@ fn bodies_that_come_or_leave_alone_or_have_no_end_while_all_are_sorted_are_exact
     rig.start(&scene.boxes);
     let mut rng = Rng::new(5);
     let mut inside = [true; BODIES];
-    // Longer than the frame of the curve lasts.
+    // More frames than one coordinate frame of the space-filling curve is used for.
     for frame in 0..400 {
         scene.step();
         let mut boxes = scene.boxes.clone();
-        // Two are everywhere for some frames: the box of one grows so far, the other leaves and comes without bounds.
+        // Two bodies are unbounded for some frames: the box of one grows without limit, the other leaves and comes back
+        // unbounded.
         let endless = match frame % 10 {
             0..=2 => Some(0_u32),
             4..=6 => Some(1),
@@ -211,7 +211,7 @@ fn bodies_that_come_or_leave_alone_or_have_no_end_while_all_are_sorted_are_exact
             left.push(1);
             came.push(1);
         }
-        // Now and then so many that what is sorted is given up.
+        // Sometimes so many bodies change that the sort in progress is abandoned.
         let changes = if frame % 50 == 30 { 300 } else { 4 };
         for _ in 0..changes {
             let body = 2 + rng.below(BODIES - 2);
@@ -225,7 +225,7 @@ fn bodies_that_come_or_leave_alone_or_have_no_end_while_all_are_sorted_are_exact
         let stays = |body: &u32| inside[*body as usize] && !came.contains(body);
         let moved: Vec<u32> = scene.moved.iter().copied().filter(stays).collect();
         rig.change(&boxes, &moved, &left, &came);
-        // Bodies that are out stand far away, each by itself; the endless one meets all others.
+        // For the exact set, absent bodies stand far away, each alone; the unbounded one overlaps all others.
         let mut seen = boxes;
         let alone = |body: &usize| !inside[*body] || endless == Some(*body as u32);
         for body in (0..BODIES).filter(alone) {
@@ -248,7 +248,7 @@ fn candidates_are_tried_again_when_bodies_have_calmed_and_not_before() {
     let mut scene = Scene::new(Kind::Gas, 1000, 11);
     let mut rig = Rig::new(Level::best(), 1000, false);
     rig.start(&scene.boxes);
-    // Returns how many were worked from scratch.
+    // Returns the number of frames that were worked from scratch.
     let frames = |rig: &mut Rig, scene: &mut Scene, frames: usize, move_on: bool| {
         let mut scratch = 0;
         for frame in 0..frames {
@@ -257,7 +257,8 @@ fn candidates_are_tried_again_when_bodies_have_calmed_and_not_before() {
             }
             rig.take(scene);
             rig.tick(&exact::pairs(&scene.boxes), &format!("frame {frame}"));
-            // A list that is kept for some ticks only is compared as candidates are, for another cause.
+            // A list kept for a spell of ticks is compared like candidates (same mode, cause `Spell`), but counts as
+            // from scratch here.
             let way = rig.work().way;
             scratch += usize::from(way.is_some_and(|(mode, cause)| {
                 mode == BroadMode::Scratch || cause == BroadCause::Spell
@@ -267,7 +268,7 @@ fn candidates_are_tried_again_when_bodies_have_calmed_and_not_before() {
     };
     frames(&mut rig, &mut scene, 100, true);
     assert_eq!(frames(&mut rig, &mut scene, 800, true), 800, "no trial");
-    // All are told as moved, and none is elsewhere.
+    // All bodies are reported as moved, but none has changed its position.
     frames(&mut rig, &mut scene, 256, false);
     assert_eq!(frames(&mut rig, &mut scene, 100, false), 0, "candidates");
 }
@@ -281,7 +282,7 @@ fn two_bodies_that_leave_their_fat_boxes_in_one_tick_are_one_pair() {
     rig.start(&boxes);
     let mut rng = Rng::new(5);
     for tick in 0..400 {
-        // Two bodies jump to one place, near or far, and apart again.
+        // Two bodies jump to one place, near or far; later jumps separate them again.
         let (a, b) = (rng.below(40), rng.below(40));
         let place = [rng.between(0.0, 120.0) as f32, 0.0, 0.0];
         boxes[a] = at(place, 0.5);
@@ -300,7 +301,7 @@ fn a_slot_that_another_body_takes_in_the_same_tick_keeps_no_pair() {
     let mut boxes: Vec<_> = (0..60).map(|_| at(place(), 0.5)).collect();
     rig.start(&boxes);
     for tick in 0..400_u32 {
-        // Four leave; into their slots, and so into their lanes, come others; two of them to the same place.
+        // Four bodies leave, and others take their slots and thereby their lanes; two of these at the same place.
         let churned: Vec<u32> = (0..4).map(|k| (tick * 7 + k * 13) % 60).collect();
         for (k, body) in churned.iter().enumerate() {
             if k > 1 {
@@ -324,7 +325,7 @@ fn bodies_that_crowd_to_one_place_while_all_are_sorted_lose_no_event() {
     for frame in 0..900 {
         scene.step();
         let mut boxes = scene.boxes.clone();
-        // In some spells some more go to one place in each frame, until its lanes are full.
+        // In half of the spells an increasing number of bodies goes to one place, until its lanes are full.
         let crowd = [0, 0, 0, 0, 0, 45, 45, 45, 45, 45][frame / 3 % 10];
         if frame % 30 == 15 {
             place = std::array::from_fn(|_| rng.between(2.0, 8.0) as f32);
@@ -347,7 +348,7 @@ fn a_crowd_that_drifts_away_is_listed_and_measured_from_elsewhere_in_time() {
     let mut listed = 0;
     for frame in 0..2400 {
         scene.step();
-        // Many times as far as it is wide.
+        // The distance grows to many times the width of the crowd.
         let by = 0.04 * frame as f32;
         let gone = |one: &Box3| one.map(|[x, y, z]| [x + by, y, z - 2.0 * by]);
         let boxes: Vec<Box3> = scene.boxes.iter().map(gone).collect();
@@ -369,7 +370,7 @@ fn bodies_that_wander_are_listed_and_so_are_those_that_go_on_again() {
     rig.start(&ways[0].boxes);
     let mut listed = [0; 2];
     for frame in 0..1600 {
-        // From one way of going to the other and back; all are elsewhere then.
+        // From one kind of motion to the other and back; all bodies change position then.
         let way = frame / 400 % 2;
         let scene = &mut ways[way];
         scene.step();
@@ -379,13 +380,13 @@ fn bodies_that_wander_are_listed_and_so_are_those_that_go_on_again() {
             rig.validate();
         }
         listed[way] += usize::from(rig.work().way.is_some_and(|way| way.0 == BroadMode::List));
-        // Whether they wander is known before the first list: none fails.
+        // The method knows before the first list that bodies wander: none of its lists fails.
         assert!(frame != 40 || listed[0] > 30, "{listed:?}");
     }
     assert!(listed.iter().all(|ticks| *ticks > 400), "{listed:?}");
 }
 
-/// Each bounced out of its swept box some ticks after it turned back: 34 strays a tick, 2 of them at the rim.
+/// Each bouncing body left its swept box some ticks after it turned back: 34 strays per tick, 2 of them at the rim.
 #[test]
 fn bug_who_bounces_in_a_layer_strayed() {
     const BODIES: usize = 2000;
@@ -420,7 +421,7 @@ fn bodies_that_swerve_jump_come_and_leave_while_the_next_list_is_made_are_exact(
     let mut listed = 0;
     for frame in 0..1200 {
         scene.step();
-        // Spells of a few that go elsewhere, the same ones again and again, by little or by far.
+        // Spells in which a few bodies, the same ones again and again, move off by a little or by far.
         for k in 0..[0, 6, 1, 20][frame / 40 % 4] {
             let body = (frame / 3 * 5 + k * 37) % BODIES;
             let far = if rng.below(3) == 0 { 3.0 } else { 0.3 };
@@ -448,7 +449,7 @@ fn bodies_that_jump_together_keep_their_pair_without_an_event() {
     let mut rig = Rig::geared("from scratch", &[true], 900, false);
     let mut rng = Rng::new(8);
     let mut place = || std::array::from_fn(|_| rng.between(0.0, 12.0) as f32);
-    // Threes that overlap, and stay together wherever they go.
+    // Groups of three overlapping bodies that stay together.
     let three =
         |place: [f32; 3], k: usize| at([place[0] + 0.2 * k as f32, place[1], place[2]], 0.4);
     let mut places: Vec<[f32; 3]> = (0..300).map(|_| place()).collect();
@@ -460,7 +461,7 @@ fn bodies_that_jump_together_keep_their_pair_without_an_event() {
     };
     rig.start(&all(&places));
     for tick in 0..300_u32 {
-        // Some jump, into lanes that others have just left; of some of them one body leaves and another comes.
+        // Some groups jump, into lanes that others have just left; in some of them one body leaves and another comes.
         let jump: Vec<u32> = (0..1 + tick % 25)
             .map(|k| (tick * 31 + k * 7) % 300)
             .collect();

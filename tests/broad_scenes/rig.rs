@@ -1,4 +1,4 @@
-//! One broad phase with its pair set, fed with the boxes of a scene, and compared frame by frame.
+//! One broad phase with its pair set, fed with the boxes of a scene, and checked in each frame.
 
 use std::collections::BTreeSet;
 
@@ -21,7 +21,7 @@ pub fn at(place: [f32; 3], half: f32) -> Box3 {
 
 pub struct Rig {
     pub name: String,
-    /// Which ticks are from scratch; nothing: as the method chooses.
+    /// In which ticks the method works from scratch, repeated cyclically; empty: as the method chooses.
     gears: &'static [bool],
     ticks: usize,
     broad: BroadPhase,
@@ -30,12 +30,12 @@ pub struct Rig {
     changes: ChangeSet,
     pairs: PairSet,
     pub delta: PairDelta,
-    /// Pairs as the events tell them.
+    /// The current pairs according to the events.
     told: BTreeSet<Pair>,
 }
 
 impl Rig {
-    /// The main method with a level of instructions.
+    /// The main method with an instruction level.
     pub fn new(level: Level, bodies: usize, far: bool) -> Self {
         let mut rig = Self::of(Method::Order, bodies, far);
         rig.broad.use_level(level);
@@ -43,7 +43,7 @@ impl Rig {
         rig
     }
 
-    /// The main method, from scratch in each tick as some numbers say, around the clock.
+    /// The main method, which works from scratch in the ticks that `gears` selects, repeated cyclically.
     pub fn geared(name: &str, gears: &'static [bool], bodies: usize, far: bool) -> Self {
         Self {
             name: name.into(),
@@ -52,7 +52,7 @@ impl Rig {
         }
     }
 
-    /// The main method from scratch in each tick, by so many threads.
+    /// The main method from scratch in each tick, with several threads.
     pub fn shared(threads: usize, bodies: usize, far: bool) -> Self {
         let mut rig = Self::geared(&format!("{threads} threads"), &[true], bodies, far);
         rig.use_threads(threads);
@@ -63,7 +63,7 @@ impl Rig {
     pub fn of(method: Method, bodies: usize, far: bool) -> Self {
         let mut rng = Rng::new(bodies as u64);
         let mut boxes = Boxes::new(bodies);
-        // Shuffled, so that nothing hangs on slots being in the order of ids.
+        // Shuffled, so that no result depends on slots being in the order of ids.
         for i in (1..bodies).rev() {
             boxes.ids.swap(i, rng.below(i + 1));
         }
@@ -81,24 +81,24 @@ impl Rig {
         }
     }
 
-    /// Lets threads share whatever they can.
+    /// Shares all work that can be shared among threads, even small amounts.
     pub fn use_threads(&mut self, threads: usize) {
         self.broad.use_threads(threads, 0);
     }
 
-    /// All bodies come.
+    /// Inserts all bodies.
     pub fn start(&mut self, boxes: &[Box3]) {
         let all: Vec<u32> = (0..boxes.len() as u32).collect();
         self.change(boxes, &[], &[], &all);
         self.tick(&crate::exact::pairs(boxes), "start");
     }
 
-    /// What a scene changed.
+    /// Applies the changes of a scene.
     pub fn take(&mut self, scene: &Scene) {
         self.put(&scene.boxes, &scene.moved, &scene.churned);
     }
 
-    /// Bodies that moved, and bodies that left while another took their slot.
+    /// Applies bodies that moved, and bodies that left while another took their slot.
     pub fn put(&mut self, boxes: &[Box3], moved: &[u32], churned: &[u32]) {
         self.change(boxes, moved, churned, churned);
     }
@@ -127,7 +127,7 @@ impl Rig {
             .extend(came.iter().map(|body| BodySlot(*body)));
     }
 
-    /// One update; pairs and events must be those of the exact set.
+    /// Runs one update; pairs and events must be those of the exact set.
     pub fn tick(&mut self, wanted: &[Pair], what: &str) {
         if let Some(afresh) = self.gears.get(self.ticks % self.gears.len().max(1)) {
             self.broad.use_afresh(*afresh);
@@ -151,7 +151,7 @@ impl Rig {
                 self.name
             );
         }
-        // Only a body that leaves and comes ends a pair and begins it in one update.
+        // A pair can end and begin in one update only if a slot was taken over by another body.
         let anew = |body: u32| self.changes.removed.iter().any(|r| r.slot.0 == body);
         for began in &self.delta.began {
             let key = pair(self.pairs.get(*began).unwrap());

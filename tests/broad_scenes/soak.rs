@@ -1,4 +1,4 @@
-//! All motions mixed while bodies come and go: a short run in every test, twenty minutes where that is asked for.
+//! All motions mixed while bodies come and go: a short run in every test run, twenty minutes on request.
 
 use sweepd::simd::boxes::Level;
 
@@ -24,7 +24,8 @@ fn soak_for_twenty_minutes() {
     }
 }
 
-/// Bodies come up to `most` and go to none, each round moving in another way; every tick is exact.
+/// Bodies come up to `most` and leave again to none; the kind of motion changes every nine ticks; every tick must be
+/// exact.
 fn soak(ticks: usize, most: usize, seed: u64) {
     let mut rig = Rig::new(Level::best(), most, false);
     rig.use_threads(2);
@@ -50,7 +51,8 @@ fn soak(ticks: usize, most: usize, seed: u64) {
                 left.push(body as u32);
             }
         }
-        // Seven ways to move: none, few, few others, all, all anew, all far, jumps.
+        // Seven kinds of motion: none; a fixed few; changing few; all, steadily; all, redrawn each tick; all, far;
+        // jumps.
         let way = tick / 9 % 7;
         for body in (0..most).filter(|body| inside[*body] && way != 0) {
             let mine = match way {
@@ -74,7 +76,7 @@ fn soak(ticks: usize, most: usize, seed: u64) {
             moved.push(body as u32);
         }
         if phase == 7 && tick.is_multiple_of(5) {
-            // To none at all, and up again.
+            // All bodies leave; the next ticks insert some again.
             left.extend(
                 (0..most as u32).filter(|body| inside[*body as usize] && !came.contains(body)),
             );
@@ -82,7 +84,7 @@ fn soak(ticks: usize, most: usize, seed: u64) {
             moved.clear();
         }
         rig.change(&boxes, &moved, &left, &came);
-        // Bodies that are out stand far away, each by itself.
+        // For the exact set, absent bodies stand far away, each alone.
         let mut seen = boxes.clone();
         for (body, inside) in inside.iter().enumerate() {
             if !inside {

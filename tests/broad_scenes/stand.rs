@@ -1,9 +1,9 @@
-//! Goal: where bodies stand, and only tremble, their boxes are held against their holds and none is stored; the pairs
-//! are exact all the same, whatever stirs the bodies then.
+//! Goal: while bodies stand and only tremble, their boxes are compared with their kept boxes and none is stored; the
+//! pairs stay exact for any later motion.
 //!
-//! Method: a pile, long enough for all to have been everywhere they tremble to. Then, again and again, one way of
-//! stirring it: few or half of the bodies move, some jump, all drift, some leave and come, boxes swell. What each tick
-//! did is read off its work; every frame is compared with the exact set, and the structure is checked.
+//! Method: a pile that trembles until it counts as standing. Then it is disturbed repeatedly, in one way at a time: few
+//! or half of the bodies move, some jump, all drift, some leave and come, boxes grow. The mode of each tick is read
+//! from the work counters; every frame is compared with the exact set, and the structure is validated.
 
 use sweepd::wire::{BroadCause, BroadMode};
 
@@ -13,16 +13,17 @@ use crate::rig::Rig;
 use crate::scenes::{Box3, Kind, Scene};
 
 const BODIES: usize = 600;
-/// Ticks after which a pile that is left alone stands: bodies have forgotten the margins of their ways.
+/// Most ticks until an undisturbed pile counts as standing: by then the method has forgotten the margins of earlier
+/// motion.
 const SETTLES: usize = 6000;
 
-/// One tick; whether the bodies stood in it.
+/// Runs one tick; returns whether the method treated the bodies as standing.
 fn tick(rig: &mut Rig, boxes: &[Box3], what: &str) -> bool {
     rig.tick(&exact::pairs(boxes), what);
     rig.work().way == Some((BroadMode::List, BroadCause::Standing))
 }
 
-/// Ticks of a pile that trembles, until it stands.
+/// Runs ticks of a trembling pile until it counts as standing.
 fn settle(rig: &mut Rig, scene: &mut Scene, what: &str) {
     let stands = (0..SETTLES).any(|frame| {
         scene.step();
@@ -34,7 +35,7 @@ fn settle(rig: &mut Rig, scene: &mut Scene, what: &str) {
     rig.validate();
 }
 
-/// Times that it is stirred, in one of eight ways each.
+/// Number of disturbances, each in one of eight ways.
 const ROUNDS: usize = if cfg!(debug_assertions) { 8 } else { 80 };
 
 fn shift(one: &Box3, by: [f32; 3]) -> Box3 {
@@ -44,7 +45,8 @@ fn shift(one: &Box3, by: [f32; 3]) -> Box3 {
 #[test]
 fn bodies_that_stand_are_exact_whatever_stirs_them() {
     let mut scene = Scene::new(Kind::Pile, BODIES, 5);
-    // Always with candidates: stirred for long enough, a pile is worked without them for some hundred ticks.
+    // Always with candidates: after a long enough disturbance a pile would be worked without them for some hundred
+    // ticks.
     let mut rig = Rig::geared("standing", &[false], BODIES, false);
     let mut rng = Rng::new(3);
     rig.start(&scene.boxes);
@@ -65,20 +67,20 @@ fn bodies_that_stand_are_exact_whatever_stirs_them() {
                 let by: [f32; 3] = match round % 8 {
                     // They tremble, all or some of them.
                     0..=4 => tremble(&mut rng),
-                    // All drift, slowly at first, and are back at once.
+                    // All drift with increasing speed, then are back at once.
                     5 => [0.002 * frame as f32 * frame as f32, 0.0, 0.0],
-                    // One of fifty jumps.
+                    // One body in fifty jumps.
                     6 if rng.once_in(50) => std::array::from_fn(|_| rng.between(-3.0, 3.0) as f32),
                     _ => tremble(&mut rng),
                 };
                 *boxed = shift(home, by);
-                // Some swell or shrink where they are: their middles tell nothing of it.
+                // Some boxes grow at one corner, where their centres show little of it.
                 if round % 8 == 7 {
                     boxed[0] = boxed[0].map(|x| x - 1e-3 * frame as f32);
                 }
                 moved.push(body as u32);
             }
-            // Some leave, and others come in their slots.
+            // Some leave, and others take their slots.
             let churned: Vec<u32> = if round % 3 == 2 {
                 moved.extract_if(.., |_| rng.once_in(100)).collect()
             } else {

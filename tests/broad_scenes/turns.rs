@@ -1,8 +1,8 @@
-//! Goal: what bodies do by turns, or all at once, has no cliff: sources of two rates make no list of candidates in every
-//! other tick, and where very many leave or jump, all are sorted instead of moved one by one. The pairs are exact all
-//! the same.
+//! Goal: motion that alternates, or that sets in at once, has no performance cliff: sources of two rates do not cause a
+//! new list of candidates in every other tick, and if very many bodies leave or jump, all are sorted instead of moved
+//! one by one. The pairs stay exact.
 //!
-//! Method: a gas with candidates that last, moved so by hand; what each tick did is read off its work.
+//! Method: a gas with persistent candidates, moved by hand; the mode of each tick is read from the work counters.
 
 use sweepd::wire::{BroadCause, BroadMode};
 
@@ -13,7 +13,7 @@ use crate::scenes::{Box3, Kind, Scene};
 
 const BODIES: usize = 2000;
 
-/// A gas at rest, with candidates.
+/// A gas at rest, in the mode with candidates.
 fn at_rest(name: &str) -> (Rig, Vec<Box3>) {
     let scene = Scene::new(Kind::Gas, BODIES, 5);
     let mut rig = Rig::geared(name, &[false], BODIES, false);
@@ -26,7 +26,7 @@ fn at_rest(name: &str) -> (Rig, Vec<Box3>) {
     (rig, scene.boxes)
 }
 
-/// Moves some bodies a little, and tells which way the tick took.
+/// Moves some bodies a little; returns the mode of the tick.
 fn nudge(rig: &mut Rig, boxes: &mut [Box3], moved: &[u32], rng: &mut Rng) -> BroadMode {
     for body in moved {
         let by: [f32; 3] = std::array::from_fn(|_| rng.between(-2e-2, 2e-2) as f32);
@@ -46,14 +46,14 @@ fn bug_sources_of_two_rates_had_all_candidates_listed_anew_by_turns() {
     let all: Vec<u32> = (0..600).collect();
     for round in 0..40 {
         assert_eq!(nudge(&mut rig, &mut boxes, &all, &mut rng), BroadMode::List);
-        // One fast tick for each slow one, two, three: the list is kept for them.
+        // One to three ticks of the fast source for each of the slow one: the list is kept for them.
         for _ in 0..=round % 3 {
             let way = nudge(&mut rig, &mut boxes, &fast, &mut rng);
             assert_eq!(way, BroadMode::List, "round {round}");
         }
         rig.validate();
     }
-    // It is let go where they alone go on.
+    // The list is dropped once only the fast source continues.
     let ways: Vec<_> = (0..4)
         .map(|_| nudge(&mut rig, &mut boxes, &fast, &mut rng))
         .collect();
@@ -94,7 +94,7 @@ fn bodies_that_leave_at_once_and_come_again_are_exact() {
         let left: Vec<u32> = (0..BODIES as u32).filter(|_| rng.once_in(share)).collect();
         rig.change(&boxes, &[], &left, &[]);
         let mut there = boxes.clone();
-        // Who is away overlaps nobody.
+        // For the exact set, absent bodies overlap none.
         for body in &left {
             there[*body as usize] = at([-1e6 - 10.0 * *body as f32, 0.0, 0.0], 0.1);
         }

@@ -1,5 +1,5 @@
-//! `sweepd doctor` beside daemons that live, are stopped and were killed. What nodes of killed ones leave is tested under
-//! files of their own (`transport_iceoryx`): under the default ones any daemon on this machine cleans them up.
+//! `sweepd doctor` next to daemons that run, are stopped and were killed. Leftover nodes of killed daemons are tested
+//! with separate files (`transport_iceoryx`): with the default ones any daemon on this machine cleans them up.
 
 use std::fs::File;
 use std::os::fd::AsFd as _;
@@ -14,7 +14,7 @@ use sweepd::transport::client::Topics;
 use super::{code, err, head, out};
 use crate::live::{Desk, TWO_SPHERES, at, output, run_out, step};
 
-/// The findings of a run, and whether it ended as they say it must.
+/// Runs `doctor` and returns its findings; asserts that its exit code matches them.
 fn look(desk: &Desk, args: &[&str]) -> Vec<Value> {
     let mut all = vec!["doctor", "--json", "--instance", &desk.instance];
     all.extend_from_slice(args);
@@ -44,7 +44,7 @@ fn look(desk: &Desk, args: &[&str]) -> Vec<Value> {
     findings
 }
 
-/// Those of a check whose text has this word.
+/// The findings of a check whose text contains this word.
 fn of<'a>(findings: &'a [Value], check: &str, word: &str) -> Vec<&'a Value> {
     let fits = |f: &&Value| f["check"] == check && f["what"].as_str().unwrap().contains(word);
     findings.iter().filter(fits).collect()
@@ -94,7 +94,7 @@ fn a_killed_daemon_is_seen_and_cleaned_and_one_that_lives_beside_it_is_left_alon
     let (dead, alive) = (Desk::new(), Desk::new());
     let living = alive.run(TWO_SPHERES, &[]);
     let mut client = alive.client(Some("sim"));
-    // Who has missed messages of these opens its port anew, with other files.
+    // A client that missed messages of these topics reopens its port, with other files; the test compares the files.
     let topics = Topics {
         changes: false,
         contact_changes: false,
@@ -109,13 +109,13 @@ fn a_killed_daemon_is_seen_and_cleaned_and_one_that_lives_beside_it_is_left_alon
     let path = lock(&dead).unwrap();
     let free = format!("`{}` that nobody holds", dead.instance);
     for _ in 0..2 {
-        // To look is to change nothing.
+        // Without `--clean` nothing is changed.
         let findings = look(&dead, &[]);
         let seen = of(&findings, "leftovers", &free);
         assert_eq!((seen.len(), &seen[0]["level"]), (1, &"warning".into()));
         assert!(seen[0]["do"].as_str().unwrap().contains("--clean") && path.exists());
     }
-    // Another's leftovers are not the living one's to clean.
+    // `--clean` with the running instance does not remove the leftovers of another instance.
     look(&alive, &["--clean"]);
     assert!(path.exists());
     let findings = look(&dead, &["--clean"]);
@@ -173,7 +173,7 @@ fn a_name_that_is_held_without_an_answer_is_wrong_and_says_by_whom() {
     let silent = of(&findings, "sources", "nothing of source \"sim\" yet");
     assert_eq!(silent.len(), 1, "{findings:?}");
 
-    // What a daemon's child inherited goes on being locked.
+    // A child process of a killed daemon can still hold its lock.
     daemon.kill();
     let path = lock(&desk).unwrap();
     let file = File::open(&path).unwrap();
@@ -189,7 +189,7 @@ fn a_name_that_is_held_without_an_answer_is_wrong_and_says_by_whom() {
     );
     assert!(path.exists(), "what is held is not cleaned");
 
-    // A daemon of another version wrote this.
+    // Simulates the lock file of a daemon of another version.
     let text = std::fs::read_to_string(&path).unwrap();
     let newer = text.replace("\"wire_version\":1", "\"wire_version\":99");
     std::fs::write(&path, newer).unwrap();

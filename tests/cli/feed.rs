@@ -1,4 +1,4 @@
-//! `sweepd feed` as a source: what it moves, how fast, and what it does without a daemon.
+//! `sweepd feed` as a source: which bodies it moves, how fast, and its behaviour without a daemon.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use sweepd::wire::{State, TickCause, name_str};
 use super::{code, err};
 use crate::live::{Desk, SECOND_NS, TWO_SPHERES, output, state, tick_until, until};
 
-/// A daemon and a scene of so many bodies, written by the command itself.
+/// Writes a scene of `count` bodies with the command itself; returns its path.
 fn pool(desk: &Desk, count: &str) -> String {
     let path = desk.dir.join("pool.toml").to_str().unwrap().to_owned();
     let ended = output(&["feed", "--write-scene", &path, "--count", count, "--force"]);
@@ -18,7 +18,7 @@ fn pool(desk: &Desk, count: &str) -> String {
     path
 }
 
-/// Positions of all bodies by id, of the newest tick with bodies.
+/// Positions of all bodies by id, from the newest tick with bodies.
 fn places(client: &mut Client) -> BTreeMap<u64, [f64; 3]> {
     loop {
         assert_eq!(client.wait_tick(30 * SECOND_NS).unwrap(), Heard::Tick);
@@ -186,7 +186,7 @@ fn with_work_of_its_own_it_leaves_the_rest_of_each_frame_to_the_daemon_and_tells
         tick.sources[0].seq == 40
     });
     assert_eq!(feed.end().0.code(), Some(0), "{}", feed.stderr());
-    // A daemon that has no budget of its own has what the frame leaves it, and no more.
+    // A daemon without a budget of its own has the time that the frame leaves, and no more.
     assert!(!given_ns.is_empty());
     assert!(given_ns.iter().all(|ns| *ns < 49_000_000), "{given_ns:?}");
     let text = feed.stdout();
@@ -200,7 +200,7 @@ fn with_work_of_its_own_it_leaves_the_rest_of_each_frame_to_the_daemon_and_tells
     };
     let work = figures("the source's own work");
     assert!(1.0 <= work[0] && work[3] <= 3.0, "{text}");
-    // What is left is said: never more than the frame without the work.
+    // The time left is reported; it is never more than the frame without the work.
     assert!(figures("left for the tick")[3] < 49.0, "{text}");
     assert!(figures("until the result was there")[0] >= 1.0, "{text}");
     let count = |what: &str| -> usize {
@@ -208,8 +208,8 @@ fn with_work_of_its_own_it_leaves_the_rest_of_each_frame_to_the_daemon_and_tells
         let last = before.split_whitespace().next_back();
         last.unwrap().parse().unwrap()
     };
-    // The work is short beside the frame and nearly all of it is left for the tick: then a result is late, or cut short,
-    // only where others take the cores, and that seldom (0 or 1 of 40 with 4 busy processes on 2 cores).
+    // The work is short compared with the frame, and nearly all of it is left for the tick. So a result is late or cut
+    // short only when other load takes the cores, which is rare (0 or 1 of 40 with 4 busy processes on 2 cores).
     assert!(count(" of 40 frames over 50.0 ms") <= 8, "{text}");
     assert!(count(" stopped with pairs undecided") <= 8, "{text}");
     assert!(text.contains("; 0 without a result"), "{text}");
@@ -230,7 +230,7 @@ fn with_work_of_its_own_a_feed_of_which_no_frame_had_a_result_is_no_good_end_and
         let args = ["--rate", "20", "--work", "1ms..2ms", "--frames", frames];
         desk.start("feed", &[&[path.as_str()], &args[..]].concat())
     };
-    // Each frame waits a second for its result.
+    // Each frame waits one second for its result.
     let mut second = work("2");
     assert_eq!(second.end().0.code(), Some(4), "{}", second.stderr());
     let said = second.stderr();
@@ -244,7 +244,7 @@ fn with_work_of_its_own_a_feed_of_which_no_frame_had_a_result_is_no_good_end_and
         "{}",
         second.stdout()
     );
-    // The place is free in the middle of the next one.
+    // The source becomes free while the next feed runs.
     let mut third = work("12");
     until("told", || third.stderr().contains("source_taken"));
     assert_eq!(first.stop().0.code(), Some(0));
@@ -265,7 +265,7 @@ fn a_signal_ends_it_with_code_0_also_while_it_waits_for_a_daemon() {
     let mut daemon = desk.run(TWO_SPHERES, &[]);
     let mut reader = desk.client(None);
     for signal in [Signal::INT, Signal::TERM] {
-        // Once a second, and with work of its own: also in its long sleeps.
+        // At one frame per second, and with its own work: the signal must end its long sleeps too.
         for more in [
             &["--rate", "1"][..],
             &["--rate", "20", "--work", "5ms..10ms"],
@@ -307,12 +307,12 @@ fn a_feed_started_first_waits_and_one_that_runs_goes_on_over_a_restart() {
     assert_eq!(feed.ended(), None, "{}", feed.stderr());
     let mut daemon = desk.start("run", &[&path]);
     let mut client = desk.source("nobody");
-    // It looks at what the daemon says once a second.
+    // The feed reads the daemon's ticks once a second.
     let boot = tick_until(&mut client, "frames", |tick| tick.sources[0].frames > 150)
         .header
         .boot_id;
     daemon.kill();
-    // Long enough for the feed to see that it is alone.
+    // The feed has noticed that there is no daemon.
     until("told", || feed.stderr().contains("no tick since"));
     assert_eq!(feed.ended(), None, "{}", feed.stderr());
     let _next = desk.start("run", &[&path]);
@@ -357,7 +357,7 @@ fn what_is_refused_of_a_body_that_an_edit_has_removed_is_told() {
     assert!(client.request(&edit, &[], 30 * SECOND_NS).unwrap().ok);
     until("told", || feed.stderr().contains("unknown_body"));
     assert_eq!(feed.ended(), None, "{}", feed.stderr());
-    // Its id is kept for its name in this boot: no other body is moved in its place.
+    // The id stays reserved for its name in this boot, so no other body can be moved in its place.
     let edit = format!(
         r#"{{"edits": [{{"put": {{"name": "another", "source": "feed", "id": {id},
         "shape": {{"type": "sphere", "radius": 0.1}}}}}}]}}"#
@@ -394,7 +394,7 @@ fn bug_a_feed_of_another_scene_moved_the_bodies_that_had_its_ids() {
     tick_until(&mut client, "a tick after them", |_| true);
     let source = client.view().tick().sources[0];
     assert_eq!((source.frames, source.refused), (0, 0), "nothing was sent");
-    // One that runs ends when the next daemon's scene is another.
+    // A running feed ends when the next daemon has another scene.
     let scene = desk.dir.join("scene.toml");
     let mut feed = desk.start("feed", &[scene.to_str().unwrap(), "--rate", "50"]);
     tick_until(&mut client, "frames", |tick| tick.sources[0].frames > 5);

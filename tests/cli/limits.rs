@@ -1,5 +1,6 @@
-//! Goal: a process that may open too few files, or make too small ones, says so, at its start or when it meets that; what
-//! works goes on. Method: the real binary under `ulimit`, and running ones whose limits are lowered.
+//! Goal: a process whose limit of open files or of file size is too low reports it at its start or when the limit is
+//! reached; everything else continues. Method: the real binary under `ulimit`, and running processes whose limits are
+//! lowered.
 
 use rustix::process::Resource;
 use sweepd::transport::client::{Client, Topics};
@@ -52,11 +53,11 @@ fn bug_commands_with_too_few_open_files_told_of_versions_or_of_nothing() {
             out(&ended)
         );
     }
-    // As few as are said to be enough are.
+    // The number that the message names as enough is enough.
     let enough = sweepd::limits::CLIENT_FILES_LEAST + 12;
     let limit = format!("ulimit -n {enough}");
     for command in &commands {
-        // The source is taken.
+        // A second feed would fail because the source is taken.
         if command[0] != "feed" {
             let ended = run_out(limited(&limit), command);
             assert_eq!(code(&ended), Some(0), "{command:?} {}", err(&ended));
@@ -85,7 +86,7 @@ fn bug_open_files_that_ran_out_in_the_run_were_not_told_and_the_daemon_was_to_be
             .count()
     };
     assert_eq!(told(&daemon), 0);
-    // It is there, and is not heard or hears nothing.
+    // The client connects, but its port cannot be opened completely: its frames or its subscription have no effect.
     let late = Client::connect(&desk.instance, Some("sim"), SECOND_NS / 2).map(|mut late| {
         let _in_vain = late.subscribe(Topics::ALL);
         late
@@ -97,7 +98,7 @@ fn bug_open_files_that_ran_out_in_the_run_were_not_told_and_the_daemon_was_to_be
         said.contains(&limit) && said.contains("`ulimit -n 1024`"),
         "{said}"
     );
-    // Who was there first is served on, and the log is not filled.
+    // Existing clients are still served, and the message is logged only once.
     for _ in 0..50 {
         step(&mut client, &rows);
         assert!(client.view().pairs().is_some());
@@ -112,7 +113,7 @@ fn bug_open_files_that_ran_out_in_the_run_were_not_told_and_the_daemon_was_to_be
         "{line}"
     );
     assert!(!looked.contains("kill"), "{looked}");
-    // With the files back, who comes then is served.
+    // With the limit restored, new clients are served.
     drop(late);
     daemon.limit(Resource::Nofile, files.most);
     let mut next = desk.client(None);
@@ -131,7 +132,7 @@ fn bug_open_files_that_ran_out_in_the_run_were_not_told_and_the_daemon_was_to_be
     assert_eq!(daemon.stop().0.code(), Some(0), "{}", daemon.stderr());
 }
 
-/// The same `put` sent again was no edit, so that nothing mended it.
+/// Sending the same `put` again was no edit, so the subscription could not be repaired.
 #[cfg(feature = "ros2")]
 #[test]
 fn bug_a_body_whose_subscription_failed_was_not_heard_for_ever() {
@@ -157,7 +158,7 @@ fn bug_a_body_whose_subscription_failed_was_not_heard_for_ever() {
                 .is_some()
         });
     };
-    // With it come the files that answers take.
+    // The first `put` also opens the files that answers need.
     put("early");
     let files = OpenFiles::of(daemon.pid()).unwrap();
     daemon.limit(Resource::Nofile, 3);
@@ -178,7 +179,7 @@ fn bug_a_body_whose_subscription_failed_was_not_heard_for_ever() {
             .stderr()
             .contains("body late: its poses can come now")
     });
-    // Once in the log, once as a fault.
+    // Twice: once as a log line, once as a fault.
     assert_eq!(
         daemon.stderr().matches(failed).count(),
         2,
@@ -227,7 +228,7 @@ fn a_recording_that_becomes_as_long_as_a_file_may_be_is_ended_and_told_and_the_d
     let (scene, tape) = (scene.to_str().unwrap(), file.to_str().unwrap());
     let made = output(&["feed", "--write-scene", scene, "--count", "100"]);
     assert_eq!(code(&made), Some(0), "{}", err(&made));
-    // It is said beforehand.
+    // The limit is reported at the start of a recording.
     let args = [
         "run",
         scene,
@@ -246,14 +247,15 @@ fn a_recording_that_becomes_as_long_as_a_file_may_be_is_ended_and_told_and_the_d
         "{said}"
     );
 
-    // Else its length is taken for that of the next one.
+    // Otherwise the length of this file would be taken for that of the next recording.
     std::fs::remove_file(&file).unwrap();
     let args = [scene, "--record", tape, "--budget", "none"];
     let mut daemon = desk.start("run", &args);
     let mut client = desk.client(None);
     let mut feed = desk.start("feed", &[scene, "--rate", "200"]);
     let bytes = || std::fs::metadata(&file).map_or(0, |meta| meta.len());
-    // A chunk is of 1 MiB, and its length may be seen while it is being written: the first one is whole.
+    // A chunk has 1 MiB, and its length may be visible while it is being written; beyond 2 MB the first one is
+    // complete.
     until("a chunk is written", || bytes() > 2_000_000);
     let most = bytes() + 500_000;
     daemon.limit(Resource::Fsize, most);
@@ -279,7 +281,7 @@ fn a_recording_that_becomes_as_long_as_a_file_may_be_is_ended_and_told_and_the_d
     assert_eq!(daemon.stderr().matches("the recording ends").count(), 1);
 
     let ended = output(&["replay", tape, "--json"]);
-    // Nothing differs, but what came later is not known.
+    // There is no difference, but the recording ends early, hence code 1.
     assert_eq!(code(&ended), Some(1), "{} {}", out(&ended), err(&ended));
     let json: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
     assert_eq!(json["ending"], "early", "{json}");
@@ -287,7 +289,7 @@ fn a_recording_that_becomes_as_long_as_a_file_may_be_is_ended_and_told_and_the_d
     assert!(why.contains("`ulimit -f unlimited`"), "{json}");
     assert_eq!(json["difference"], serde_json::Value::Null);
     let ticks = json["ticks"].as_u64().unwrap();
-    // What was written before the limit is there, but for the chunk that did not fit.
+    // Everything before the limit is in the file, except for the chunk that did not fit.
     assert!(ticks > 20 && json["ticks_exact"] == ticks, "{json}");
 }
 
@@ -309,7 +311,7 @@ fn bug_a_log_that_could_not_be_written_ended_the_daemon() {
     assert_eq!(code(&ended), Some(0));
 }
 
-/// They were read once the daemon had its name, and `/dev/zero` until the memory was full.
+/// The files were read only after the daemon had taken its name, and `/dev/zero` until the memory was full.
 #[cfg(feature = "ros2")]
 #[test]
 fn bug_files_of_parameters_are_read_to_a_limit_and_before_the_name_is_taken() {

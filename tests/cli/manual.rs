@@ -1,4 +1,4 @@
-//! `sweepd completions` and `sweepd man`: what shells and readers of man pages make of them.
+//! `sweepd completions` and `sweepd man`, checked with real shells and readers of man pages.
 
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -6,7 +6,7 @@ use std::process::{Command, Output, Stdio};
 use super::{code, err, head, out};
 use crate::live::{Desk, finish, output};
 
-/// Runs a program that may not be there.
+/// Runs a program; `None` if it is not installed.
 fn run(program: &str, args: &[&str]) -> Option<Output> {
     let child = Command::new(program)
         .args(args)
@@ -37,7 +37,7 @@ fn shells_take_their_completions() {
             "{shell}"
         );
     }
-    // Bash itself completes a command, a flag and a value.
+    // Bash itself completes a command, flags and a value.
     let complete = |words: &[&str]| {
         let (last, at) = (words.len() - 1, words.len() - 1);
         let script = format!(
@@ -130,7 +130,7 @@ fn man_pages_are_written_for_every_command_and_read_without_a_complaint() {
         "{}",
         err(&ended)
     );
-    // A file where the folder should be.
+    // A file exists where the folder should be.
     let file = desk.write("file", "");
     let ended = output(&["man", "--out", file.to_str().unwrap()]);
     assert_eq!(code(&ended), Some(2), "{}", err(&ended));

@@ -1,4 +1,4 @@
-//! `sweepd monitor` on a pipe and on a terminal, with and without a daemon.
+//! `sweepd monitor` with a pipe and with a terminal, with and without a daemon.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::process::Stdio;
@@ -77,7 +77,7 @@ fn what_is_no_terminal_gets_no_escape_codes() {
     assert!(!err(&ended).contains('\x1b'));
 }
 
-/// Runs the monitor behind a terminal of 24 lines of so many columns.
+/// Runs the monitor in a terminal of 24 lines and `columns` columns; `None`: there is no `script` program.
 fn on_a_terminal(desk: &Desk, columns: u32, environment: &str, ticks: u32) -> Option<String> {
     let binary = env!("CARGO_BIN_EXE_sweepd");
     let command = format!(
@@ -90,7 +90,7 @@ fn on_a_terminal(desk: &Desk, columns: u32, environment: &str, ticks: u32) -> Op
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn();
-    // `script` is not everywhere; without it there is no terminal to test on.
+    // The `script` program provides the terminal; where it is not installed the test is skipped.
     let ended = finish(child.ok()?);
     assert_eq!(code(&ended), Some(0), "{} {}", out(&ended), err(&ended));
     Some(out(&ended))
@@ -159,7 +159,7 @@ fn keys_end_the_screen_and_the_terminal_is_as_it_was() {
     step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
     let binary = env!("CARGO_BIN_EXE_sweepd");
     let [before, after] = ["before", "after"].map(|name| desk.dir.join(name));
-    // Ctrl-C reaches the shell as well, and not every one outlives it.
+    // Ctrl-C reaches the shell as well, which without a trap could end before it prints the code.
     let command = format!(
         "trap : INT; stty rows 24 cols 80; stty -a > {}; TERM=xterm {binary} monitor --instance {}; echo code $?; stty -a > {}",
         before.display(),
@@ -256,12 +256,12 @@ fn a_signal_ends_it_with_code_0_also_while_it_waits_for_a_daemon() {
     assert_eq!(running.end().0.code(), Some(0), "{}", running.stderr());
 }
 
-/// A second signal ended it with 4, also one that came with the first, as `timeout` sends them.
+/// A second signal ended it with code 4 even if it came together with the first, as `timeout` sends them.
 #[test]
 fn bug_two_signals_at_once_are_one_and_a_later_one_ends_what_is_stuck() {
     let desk = Desk::new();
     let _daemon = desk.run(TWO_SPHERES, &[]);
-    // Nobody reads what it writes, and nothing more has room.
+    // Nobody reads the pipe, and it is full.
     let (full, _unread) = std::os::unix::net::UnixStream::pair().unwrap();
     full.set_nonblocking(true).unwrap();
     while (&full).write(&[b' '; 4096]).is_ok() {}
@@ -282,7 +282,7 @@ fn bug_two_signals_at_once_are_one_and_a_later_one_ends_what_is_stuck() {
         .spawn()
         .unwrap();
     let pid = rustix::process::Pid::from_child(&stuck);
-    // It listens for signals before it connects.
+    // The monitor handles signals before it connects.
     until("it is connected", || readers() > before);
     step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
     let wait = || std::thread::sleep(std::time::Duration::from_millis(400));
@@ -313,7 +313,7 @@ fn stdout_that_is_closed_from_the_start_is_a_normal_end() {
     assert_eq!((code(&ended), err(&ended).as_str()), (Some(0), ""));
 }
 
-/// The window is closed, or the connection breaks off.
+/// The window was closed, or the connection was lost.
 #[test]
 fn bug_a_terminal_that_hung_up_is_a_normal_end() {
     let desk = Desk::new();

@@ -1,4 +1,4 @@
-//! `sweepd query A B`, `--touching`: bodies of a running daemon, as text and as JSON, and why there is no answer.
+//! `sweepd query A B`, `--touching`: bodies of a running daemon, as text and as JSON, and the reasons for no answer.
 
 use rustix::process::Signal;
 use serde_json::Value;
@@ -50,7 +50,7 @@ fn a_running_daemon_is_asked_and_says_what_the_batch_says_offline() {
     assert_eq!(live["boot_id"], format!("{:016x}", header.boot_id));
     assert_eq!(live["scene_rev"], header.scene_rev);
     assert_eq!(live["warnings"], serde_json::json!([]));
-    // The poses were sent before the question was put, and are younger than this test may be.
+    // The poses were sent before the query, and are younger than the longest duration of this test.
     let age_ns = live["age_ns"].as_u64().unwrap();
     assert!((1..60_000_000_000).contains(&age_ns), "{age_ns}");
     let turned = json(&desk, &["b", "a", "--json"]);
@@ -82,7 +82,7 @@ fn what_has_no_gap_is_refused_with_what_to_change() {
     let scene = TWO_SPHERES.replace("\"b\"", "\"arm/hand\"");
     let _daemon = desk.run(&scene, &[]);
     let mut client = desk.source("sim");
-    // No pose of either has come.
+    // Neither body has a pose yet.
     let ended = ask(&desk, &["a", "arm/hand", "--json"]);
     assert_eq!(code(&ended), Some(4), "{}", err(&ended));
     assert!(err(&ended).contains("not_received"), "{}", err(&ended));
@@ -316,7 +316,7 @@ fn without_a_daemon_that_answers_it_ends_in_time_with_code_3() {
 fn a_signal_ends_it_before_the_answer_and_that_is_no_success() {
     let desk = Desk::new();
     let mut query = desk.start("query", &["a", "b", "--wait", "600s"]);
-    // It listens for signals before it looks for a daemon; until then a signal ends it, too, without a code.
+    // The query handles signals before it looks for a daemon; before that a signal ends it without an exit code.
     let caught = || {
         let status = std::fs::read_to_string(format!("/proc/{}/status", query.pid())).unwrap();
         let line = status
@@ -332,7 +332,7 @@ fn a_signal_ends_it_before_the_answer_and_that_is_no_success() {
     assert!(query.stderr().contains("signal"), "{}", query.stderr());
 }
 
-/// It was mute for all of its wait.
+/// It printed nothing during its whole wait.
 #[test]
 fn bug_a_wait_for_a_daemon_is_told_once_and_not_with_quiet() {
     let desk = Desk::new();

@@ -1,5 +1,5 @@
-//! Goal: a run is recorded and replayed as a user does it, and recorded from beside it. Method: the real daemon and the
-//! real source; the daemon ends by SIGTERM, by `kill -9`, or does not begin.
+//! Goal: a run is recorded and replayed as a user does it, and recorded by a second process. Method: the real daemon
+//! and the real source; the daemon ends by SIGTERM or `kill -9`, or does not start.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -9,7 +9,7 @@ use rustix::process::Signal;
 use super::live::{Desk, output, until};
 use super::{code, err, out};
 
-/// A pool of bodies that a source moves; its scene file, and where a recording goes.
+/// Writes the scene of a pool that a source moves; returns the path of its file and of a recording.
 fn pool(desk: &Desk, count: &str) -> (PathBuf, PathBuf) {
     let scene = desk.dir.join("pool.toml");
     let made = output(&["feed", "--write-scene", path(&scene), "--count", count]);
@@ -21,7 +21,7 @@ fn path(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// A replay's JSON, and its exit code.
+/// Replays a file; returns its JSON and the exit code.
 fn replayed(file: &Path, more: &[&str]) -> (serde_json::Value, Option<i32>) {
     let mut args = vec!["replay", path(file), "--json"];
     args.extend_from_slice(more);
@@ -31,7 +31,7 @@ fn replayed(file: &Path, more: &[&str]) -> (serde_json::Value, Option<i32>) {
     (json, code(&ended))
 }
 
-/// Records while a source sends so many frames.
+/// Records while a source sends `frames` frames.
 fn recorded(desk: &Desk, scene: &Path, file: &Path, flags: &[&str], frames: &str, end: Signal) {
     let mut args = vec![path(scene), "--record", path(file)];
     args.extend_from_slice(flags);
@@ -40,7 +40,7 @@ fn recorded(desk: &Desk, scene: &Path, file: &Path, flags: &[&str], frames: &str
     let (fed, _) = feed.end();
     assert!(fed.success(), "{}\n{}", feed.stderr(), daemon.stderr());
     if end == Signal::KILL {
-        // What was written by now is in the file half a second later.
+        // Everything written by now is in the file half a second later.
         std::thread::sleep(Duration::from_millis(1500));
         daemon.kill();
     } else {
@@ -58,7 +58,7 @@ fn a_recorded_run_replays_bit_by_bit_with_code_0() {
         &["--budget", "none", "--budget-units", "300", "--force"],
     ] {
         recorded(&desk, &scene, &file, flags, "300", Signal::TERM);
-        // Nothing but the file is needed.
+        // The replay needs no file but the recording.
         let kept = std::fs::read(&scene).unwrap();
         std::fs::remove_file(&scene).unwrap();
         let (json, code) = replayed(&file, &[]);
@@ -70,7 +70,7 @@ fn a_recorded_run_replays_bit_by_bit_with_code_0() {
             (&"whole".into(), &0.into())
         );
         let ticks = json["ticks"].as_u64().unwrap();
-        // Of 300 frames a busy machine passes some over.
+        // On a busy machine some of the 300 frames are skipped.
         assert!(ticks > 100 && json["ticks_exact"] == ticks, "{json}");
         let (json, _) = replayed(&file, &["--from", "50", "--until", "99"]);
         assert_eq!(
@@ -83,7 +83,7 @@ fn a_recorded_run_replays_bit_by_bit_with_code_0() {
             "bug: {boot}"
         );
     }
-    // What compared nothing has found nothing out.
+    // A replay that compared nothing is not a success.
     let (json, code_of) = replayed(&file, &["--from", "99999"]);
     assert_eq!(
         (code_of, &json["ticks_exact"]),
@@ -216,7 +216,7 @@ fn bug_a_recording_was_written_over_the_scene_and_the_meshes_it_is_of() {
             said.contains(&begin) && said.contains("name another file"),
             "{said}"
         );
-        // Nothing was begun.
+        // The daemon did not start.
         assert_eq!(desk.files(), Vec::<PathBuf>::new());
         assert_eq!(
             [&scene, &mesh, &params].map(|file| std::fs::read(file).unwrap()),
@@ -297,7 +297,7 @@ fn edits_of_a_running_scene_are_in_the_recording() {
     assert!(json["ticks_exact"].as_u64().unwrap() >= 3, "{json}");
 }
 
-/// How many messages of each topic a file holds.
+/// The number of messages of each topic in a file.
 fn topics(file: &Path) -> std::collections::BTreeMap<String, usize> {
     let bytes = std::fs::read(file).unwrap();
     let mut counts = std::collections::BTreeMap::new();
@@ -339,7 +339,7 @@ fn a_client_records_what_it_hears_and_follows_a_daemon_that_starts_anew() {
             .copied()
             .unwrap_or(0)
     };
-    // Each boot tells its names; from then on each tick has everything.
+    // Each boot sends its names once; after that each tick has all topics.
     assert!(of("names") >= 2, "{counts:?}");
     let ticks = of("tick");
     assert!(ticks > 50 && of("state") == ticks, "{counts:?}");

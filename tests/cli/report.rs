@@ -1,11 +1,11 @@
-//! `sweepd report` as a user and a script meet it: what it tells, its codes, what it refuses and how.
+//! `sweepd report` as users and scripts see it: its content, its exit codes, its errors.
 
 use serde_json::Value;
 
 use super::{code, err, head, out};
 use crate::live::{Desk, output};
 
-/// Bodies that collide now and then, a mesh, a half-space, one that is swept, one that deforms, one that hangs on another.
+/// Bodies that collide now and then: a mesh, a half-space, a swept one, a deforming one, an attached one.
 const MIXED: &str = r#"
 [[source]]
 name = "left"
@@ -115,7 +115,7 @@ fn error_against_counted_work_is_the_same_to_the_last_bit_and_falls_with_the_bud
             "{row}"
         );
     }
-    // Another motion gives other figures: they are measured.
+    // Another motion gives other figures, so they are measured.
     let other = json(&[&args[..], &["--seed", "2"]].concat());
     assert_ne!(other["rows"], report["rows"]);
     let rest = json(&[&args[..], &["--motion", "rest"]].concat());
@@ -127,7 +127,7 @@ fn bug_rows_that_the_scene_leaves_out_are_held_against_the_truth_too() {
     let desk = Desk::new();
     let path = scene(&desk);
     let cut = desk.write("cut.toml", &format!("{MIXED}\n[limits]\npair_rows = 1\n"));
-    // The scene stands before its flags or behind them.
+    // The scene may come before or after its flags.
     let of = |path: &str| {
         json(&[
             "report", "error", "--ticks", "24", "--json", "--units", path,
@@ -162,7 +162,7 @@ fn error_against_time_has_a_row_a_budget_a_table_and_a_page() {
         text.contains("20.0 us") && text.contains("1000.00 ms") && text.contains("no limit"),
         "{text}"
     );
-    // Widths without an end are in no mean: they are counted beside it.
+    // Infinite widths are excluded from the means and counted separately.
     assert!(text.contains("endless"), "bug: {text}");
     assert!(
         text.contains("0 verdicts are wrong, 0 intervals exclude the truth"),
@@ -279,7 +279,7 @@ fn one_family_has_a_table_a_page_and_its_own_line() {
         text.contains("bullet") && text.contains("nested") && !text.contains("vibration"),
         "{text}"
     );
-    // Why some of them are farther off than the tolerance, and nothing is wrong.
+    // The output explains why some values differ by more than the tolerance although nothing is wrong.
     let mut nested = text.lines().filter(|line| line.starts_with("nested"));
     let why = " beyond the tolerance have a proved interval and no estimate";
     assert!(nested.next_back().unwrap().contains(why), "{text}");
@@ -337,7 +337,7 @@ fn what_cannot_be_meant_is_refused_with_what_to_change() {
         assert!(ended.stdout.is_empty(), "{args:?}");
     }
     assert_eq!(std::fs::read(&path).unwrap(), text);
-    // As of every file that a command cannot write, and before minutes of work.
+    // Like every command, it reports a file that it cannot write, here before minutes of work.
     for args in [&["stability", "--family", "gap"][..], &["error", &path]] {
         let ended = output(&[&["report"], args, &["--html", nowhere]].concat());
         assert_eq!(code(&ended), Some(4), "{args:?} {}", err(&ended));

@@ -1,18 +1,19 @@
-//! Boxes for a broad phase without a world around it.
+//! Boxes for a broad phase, without a world.
 
 use sweepd::broad::Proxies;
 use sweepd::ids::{BodyId, BodySlot};
 use sweepd::math::Aabb;
 use sweepd::pairs::PairPolicy;
 
-/// Boxes by slot, each of a body. One without an end has no bound, for who asks when it comes.
+/// The box and the id of each body, by slot. A body whose box has an infinite upper x bound counts as unbounded, which
+/// is read when the body is inserted.
 pub struct Boxes {
     pub all: Vec<Aabb>,
     pub ids: Vec<u64>,
 }
 
 impl Boxes {
-    /// Empty boxes of bodies 1, 2, 3, ...
+    /// Empty boxes of the bodies with ids 1, 2, 3, ...
     pub fn new(count: usize) -> Self {
         Self {
             all: vec![Aabb::empty(); count],
@@ -33,7 +34,7 @@ impl Proxies for Boxes {
     }
 }
 
-/// Every pair counts.
+/// A policy that allows every pair.
 pub struct Everything;
 
 impl PairPolicy for Everything {

@@ -1,4 +1,4 @@
-//! What tests share: a small seeded generator, so that a printed seed is all one needs to run a failure again.
+//! Shared by the tests: a small seeded generator, so that the printed seed suffices to reproduce a failure.
 
 #![allow(
     dead_code,
@@ -10,12 +10,12 @@
 
 pub mod boxes;
 
-/// `SplitMix64` (Steele, Lea and Flood 2014): every seed is good, and equal on every machine.
+/// `SplitMix64` (Steele, Lea and Flood 2014): every seed is good, and its numbers are the same on every machine.
 #[derive(Clone, Debug)]
 pub struct Rng(u64);
 
 impl Rng {
-    /// From a seed.
+    /// A generator with this seed.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
@@ -44,7 +44,7 @@ impl Rng {
         low + (high - low) * self.unit()
     }
 
-    /// True once in `n` times.
+    /// True with probability 1 / `n`.
     pub fn once_in(&mut self, n: usize) -> bool {
         self.below(n) == 0
     }

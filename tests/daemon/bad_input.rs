@@ -1,4 +1,5 @@
-//! Clients that are wrong in every field: refused, counted, told, and nobody else's data is lost.
+//! Clients that send wrong values in every field: they are refused, counted and reported, and no other client loses
+//! data.
 
 use sweepd::limits::FRAME_ROWS_MAX;
 use sweepd::time::{Clock, SystemClock};
@@ -14,7 +15,7 @@ use crate::live::{
     words,
 };
 
-/// `a` (1) and `c` (3) of `sim`, `b` (2) of `arm`, at a rate.
+/// Bodies `a` (1) and `c` (3) of source `sim`, `b` (2) of source `arm`, at a fixed rate.
 const SCENE: &str = r#"
 [run]
 rate = 100
@@ -41,7 +42,7 @@ shape = { type = "sphere", radius = 0.5 }
 /// A change of one header.
 type Change = fn(&mut FrameHeader);
 
-/// A client of `sim` that writes every field of its header by hand.
+/// A client of `sim` that sets every field of its header by hand.
 struct Raw {
     link: IoxLink,
     header: FrameHeader,
@@ -64,7 +65,7 @@ impl Raw {
         }
     }
 
-    /// The next frame, its header changed for this once.
+    /// Sends the next frame, with its header changed for this frame only.
     fn send(&mut self, rows: &[TransformRow], change: impl FnOnce(&mut FrameHeader)) {
         self.header.seq += 1;
         let mut header = self.header;
@@ -73,7 +74,8 @@ impl Raw {
     }
 }
 
-/// A daemon, a good client of `arm` that listens, and a raw one of `sim`; all bodies known, all apart.
+/// A daemon, a correct client of `arm` that subscribes to everything, and a raw one of `sim`; all bodies known, all
+/// apart.
 fn table(desk: &Desk) -> (Running, Client, Raw) {
     let daemon = desk.run(SCENE, &[]);
     let mut arm = desk.source("arm");
@@ -223,8 +225,8 @@ fn a_second_client_of_a_source_is_refused_while_the_first_lives_and_admitted_aft
     });
     step(&mut first, &[at(1, 0.0), at(2, 6.0)]);
     drop(first);
-    // It began at 1 as every client does; in a session of its own that is no old frame. Until the daemon has seen the
-    // first one go it is refused still.
+    // The second client has a session of its own, so its sequence numbers, which start at 1, are not old. Its frames
+    // are refused until the daemon has noticed that the first client is gone.
     let session = second.session();
     let mut taken = false;
     while !taken {
@@ -249,7 +251,8 @@ fn the_place_of_a_killed_source_is_free_again_within_a_second() {
     let seen = tick_until(&mut reader, "its frames", |tick| tick.sources[0].frames > 5);
     let mut next = desk.source("sim");
     feed.kill();
-    // In ticks, a hundred a second: from the last one with a frame of the dead one, whose time-out is three seconds.
+    // Measured in ticks, a hundred per second, from the last tick with a frame of the killed feed, whose timeout is
+    // three seconds.
     let (mut last, mut frames) = (seen.header.tick, seen.sources[0].frames);
     let session = next.session();
     let taken = loop {
@@ -299,14 +302,14 @@ fn sixteen_sources_are_all_heard_a_seventeenth_is_refused_and_a_late_reader_has_
     });
     round(0.9);
     tick_until(&mut reader, "fifteen pairs", |tick| tick.colliding == 15);
-    // The scene has no seventeenth: its frames are counted, and no others are lost for it.
+    // The scene has no seventeenth source: its frames are counted as refused, and no other frame is lost.
     let mut more = desk.source("s17");
     send(&mut more, &[at(1, 7.0)]);
     let tick = tick_until(&mut reader, "refused", |tick| {
         rejected(tick, RejectReason::UnknownSource) > 0
     });
     assert_eq!(tick.colliding, 15, "{}", words(&tick));
-    // Who comes late, while nobody sends, has all of it.
+    // A client that connects later, while no source sends, gets all topics.
     let mut late = desk.source("nobody");
     let tick = tick_until(&mut late, "a tick", |_| true);
     assert_eq!((tick.sources_len, tick.colliding), (16, 15));

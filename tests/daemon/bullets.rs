@@ -1,4 +1,4 @@
-//! Continuous bodies over the wire: a bullet through a thin wall is told, with its time of impact.
+//! Continuous bodies over the wire: a bullet through a thin wall is reported, with its time of impact.
 
 use sweepd::wire::{Event, Reason, State, Verdict, pair_flags};
 
@@ -78,7 +78,7 @@ fn a_bullet_that_is_back_before_a_tick_looks_has_hit_the_wall() {
     tick_until(&mut client, "the edit", |tick| tick.header.scene_rev >= rev);
     send(&mut client, &[at(2, -40.0)]);
     tick_until(&mut client, "where it starts", |tick| tick.unknown == 0);
-    // Right after a tick: the next one has all three frames, and the last one is where the bullet was.
+    // Right after a tick: the next tick gets all three frames, and the last one has the bullet back at its start.
     for x in [-40.0, 60.0, -40.0] {
         send(&mut client, &[at(2, x)]);
     }

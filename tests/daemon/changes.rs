@@ -1,5 +1,5 @@
-//! `changes` and `contact_changes`: lists kept from them are what another process reads in `pairs` and `contacts`, through
-//! edits, lost messages, restarts.
+//! `changes` and `contact_changes`: lists kept from them equal the `pairs` and `contacts` that another process reads,
+//! through edits, lost messages and restarts.
 
 use sweepd::transport::client::{Client, FrameInfo, Heard, Rows, StepError, Topics};
 use sweepd::wire::{EndCause, TransformRow};
@@ -31,7 +31,7 @@ fn changes_only(desk: &Desk, source: Option<&str>) -> Client {
     client
 }
 
-/// Bodies in a row, `squeezed` of the first of them near one another; in each step one in five is elsewhere.
+/// Bodies in a row, the first `squeezed` of them close together; in each step another fifth of the bodies is shifted.
 fn rows(number: u64, squeezed: u64) -> Vec<TransformRow> {
     let place = |id: u64| {
         let step = if id < squeezed { 0.2 } else { 1.2 };
@@ -47,12 +47,12 @@ fn rows(number: u64, squeezed: u64) -> Vec<TransformRow> {
     (1..=BODIES).map(place).collect()
 }
 
-/// As text: NaN is equal to NaN here.
+/// Rows as text, so that NaN equals NaN.
 fn text<T: std::fmt::Debug>(rows: impl Iterator<Item = T>) -> Vec<String> {
     rows.map(|row| format!("{row:?}")).collect()
 }
 
-/// The pairs that a reader heard in a tick.
+/// The pairs that a reader received in a tick.
 fn pairs_of(reader: &mut Client, tick: u64) -> Vec<String> {
     until("the tick with its pairs", || {
         reader.view().tick().header.tick >= tick
@@ -81,7 +81,7 @@ fn lists_kept_from_changes_are_what_another_process_reads_in_pairs_and_contacts(
     reader.subscribe(topics).unwrap();
     let (mut deltas, mut cut, mut contact_deltas) = (0, 0, 0);
     for number in 1..=120 {
-        // Squeezed, they are more pairs than fit.
+        // Squeezed bodies have more pairs than fit in the list.
         let squeezed = if number % 40 > 30 { 30 } else { 3 };
         match number {
             25 => request(&mut client, r#"{"edits": [{"remove": "b7"}]}"#),
@@ -140,7 +140,7 @@ fn a_reader_that_missed_messages_has_the_whole_list_again_and_shows_no_other() {
     for number in 2..=30 {
         step(&mut client, &rows(number, 3));
     }
-    // Most of it was overtaken in its queue.
+    // Its queue has dropped most of the messages.
     assert_eq!(sleeper.latest().unwrap(), Heard::Tick);
     let (mut number, mut shown) = (30, 0);
     until("the whole list again, and those that build on it", || {

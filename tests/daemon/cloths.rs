@@ -1,4 +1,4 @@
-//! Bodies that deform, over the wire and in the daemon: a cloth on a box, and a tree that is built anew.
+//! Deforming bodies, over the wire and in the daemon: a cloth on a box, and a tree that is rebuilt.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::live::{Desk, LONG, SECOND_NS, at, state, step};
 
 const CELLS: usize = 12;
 
-/// A square of side 2 in the plane of x and y, one metre above a box.
+/// A square cloth of side 2 m in the x-y plane, one metre above a box.
 fn scene() -> String {
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
     for i in 0..=CELLS {
@@ -36,7 +36,7 @@ fn scene() -> String {
     )
 }
 
-/// The cloth with its middle pushed down to a height, stretched by a factor.
+/// The cloth stretched by a factor, with its middle pushed down to a height.
 fn cloth(height: f32, stretch: f32) -> Vec<VertexRow> {
     let place = |k: usize| f32::from(u8::try_from(k).unwrap()) / 6.0 - 1.0;
     let rows = (0..=CELLS).flat_map(|i| (0..=CELLS).map(move |j| (place(j), place(i))));
@@ -64,7 +64,7 @@ fn a_cloth_that_sinks_onto_a_box_is_told_over_shared_memory_in_each_step() {
         if k % 2 == 0 {
             client.send_vertices(1, Part::Full, &rows).unwrap();
         } else {
-            // All but a corner that does not move.
+            // All vertices except for the first, a corner that does not move.
             let part = Part::Range { first: 1, total };
             client.send_vertices(1, part, &rows[1..]).unwrap();
         }
@@ -86,7 +86,7 @@ fn a_cloth_that_sinks_onto_a_box_is_told_over_shared_memory_in_each_step() {
     let row = client.view().bodies().unwrap().rows[0];
     assert_eq!((counted, row.reject), (1, RejectReason::NotFinite.code()));
     assert_eq!(row.status, BodyStatus::Rejected.code());
-    // Another comes, is taken once the end of this one is heard, and has to send all vertices.
+    // A new client is accepted once the daemon knows that the old one is gone, and must send all vertices again.
     drop(client);
     let mut client = desk.source("sim");
     let info = FrameInfo::default();
@@ -118,7 +118,7 @@ fn the_tree_of_a_cloth_that_is_stretched_is_built_anew_while_ticks_go_on() {
     let (mut worn, mut ticks) = (false, 0_u16);
     while !(worn && ticks > 20 && daemon.engine().worn_tree().is_none()) {
         assert!(started.elapsed() < LONG, "{ticks} ticks, worn: {worn}");
-        // Its middle goes in and out of the box, so that a pair of it waits for work.
+        // The middle of the cloth enters and leaves the box, so that its pair always needs work.
         let height = if ticks % 2 == 0 { 0.4 } else { 0.6 };
         let stretch = if ticks < 5 { 1.0 } else { 3.0 };
         client

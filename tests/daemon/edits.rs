@@ -15,14 +15,14 @@ fn ask(client: &mut Client, edits: &str) -> Answer {
     client.request(&json, &[], 30 * SECOND_NS).unwrap()
 }
 
-/// The edit is done; returns its scene revision.
+/// Applies the edits; returns the scene revision.
 pub(crate) fn done(client: &mut Client, edits: &str) -> u64 {
     let answer = ask(client, edits);
     assert!(answer.ok, "{answer:?}");
     answer.scene_rev
 }
 
-/// The end that a pair's row carries on the way to this revision.
+/// The end cause in the rows of pairs up to this revision.
 fn end_by(client: &mut Client, rev: u64) -> Option<EndCause> {
     let mut cause = None;
     loop {
@@ -89,7 +89,7 @@ fn each_edit_is_done_in_a_tick_of_its_own_cause_and_ends_pairs_by_its_cause() {
     );
 }
 
-/// In lockstep ticks of edits do no work; this one is the result of a frame.
+/// In lockstep, ticks caused by edits do no work; this one does, because it is also the result of a frame.
 #[test]
 fn a_frame_that_waited_for_an_edit_has_its_result_worked_out() {
     let desk = Desk::new();
@@ -196,7 +196,7 @@ fn a_body_put_while_it_runs_takes_part_once_its_pose_has_come() {
     );
     step(&mut client, &[at(1, 0.0), at(2, 5.0), at(3, 5.8)]);
     assert_eq!(state(client.view().tick()), State::Colliding);
-    // Hung on a, it goes where a goes; its own rows are refused.
+    // Attached to `a`, body `c` moves with `a`; rows for `c` itself would be refused.
     done(
         &mut client,
         r#"{"attach": {"body": "c", "to": "a", "position": [0, 3, 0]}}"#,
@@ -213,7 +213,7 @@ fn a_body_put_while_it_runs_takes_part_once_its_pose_has_come() {
     assert_eq!(bodies[2].status, BodyStatus::Known.code());
 }
 
-/// A ball of `n * n * 2` triangles as blobs.
+/// A ball of `n * n * 2` triangles as binary vertices and faces.
 fn ball(n: u32) -> (Vec<u8>, Vec<u8>) {
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
     let mut corner = |u: f64, v: f64| {
@@ -314,12 +314,12 @@ fn a_shape_that_takes_long_to_build_does_not_stop_the_ticks() {
     assert!(answer.ok, "{answer:?}");
     let ticks = client.view().tick().header.tick - first;
     println!("{ticks} ticks, {frames} of them for frames, in the {time:?} of the request");
-    // Far fewer than come in truth; none would come while the tick's thread builds.
+    // A bound far below the usual number of frames; there would be none if the tick thread built the mesh.
     assert!(
         f64::from(frames) > time.as_secs_f64() * 5.0,
         "{frames} in {time:?}"
     );
-    // One is asked for and not waited for: the daemon still ends in time.
+    // A build that is still running does not delay the end of the daemon.
     let (json, vertices, faces) = put_ball(401, 20.0);
     let mut hasty = desk.client(None);
     assert!(
@@ -362,7 +362,7 @@ fn bug_questions_do_not_wait_for_the_mesh_of_another_client() {
             asked += 1;
         }
     }
-    // The one that waits for the mesh waits for nearly all of it; milliseconds of seconds are told here.
+    // A question that waited for the mesh would take nearly as long as the mesh: seconds, where milliseconds are usual.
     let mesh = putter.join().unwrap();
     println!("{asked} questions, the longest {longest:?}, in {mesh:?}");
     assert!(longest < mesh / 2, "{longest:?} of {mesh:?}");
@@ -388,7 +388,7 @@ fn a_margin_set_at_run_time_tells_pairs_as_near() {
     let desk = Desk::new();
     let _daemon = desk.run(TWO_SPHERES, &[]);
     let mut client = desk.source("sim");
-    // Two balls of 0.5 m, 0.5 m apart.
+    // Two balls of radius 0.5 m, 0.5 m apart.
     let apart = [at(1, 0.0), at(2, 1.5)];
     step(&mut client, &apart);
     assert_eq!(state(client.view().tick()), State::Clear);

@@ -1,4 +1,4 @@
-//! How daemons end and begin: signals, kills, a second one on the same instance.
+//! How daemons end and start: signals, kills, a second daemon on the same instance.
 
 use rustix::process::Signal;
 use std::io::Write as _;
@@ -14,7 +14,7 @@ use crate::live::{
     Desk, SECOND_NS, TWO_SPHERES, at, finish, output, step, sweepd, tick_until, until, with_hangups,
 };
 
-/// What `sweepd list --json` says of an instance.
+/// The entry of an instance in `sweepd list --json`.
 fn listed(instance: &str) -> Option<serde_json::Value> {
     let text = output(&["list", "--json"]);
     assert_eq!(text.status.code(), Some(0));
@@ -56,7 +56,7 @@ fn a_terminal_that_closes_ends_the_daemon_but_under_nohup() {
         step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
         daemon.signal(Signal::HUP);
         if ignored {
-            // It would have ended within these.
+            // Without `nohup` it would end within these steps.
             for x in [0.6, 0.7] {
                 std::thread::sleep(Duration::from_millis(500));
                 step(&mut client, &[at(1, 0.0), at(2, x)]);
@@ -92,7 +92,7 @@ fn two_signals_at_once_end_the_daemon_and_the_next_one_starts() {
             rustix::process::Pid::from_raw(i32::try_from(daemon.pid()).unwrap()).unwrap(),
             Signal::INT,
         );
-        // In time for its orderly end, or at once with the code for "could not".
+        // Code 0 after an orderly end; code 4 if the second signal came during it and ended the process at once.
         let code = daemon.end().0.code();
         assert!(matches!(code, Some(0 | 4)), "{code:?} {}", daemon.stderr());
     }
@@ -130,7 +130,7 @@ fn a_killed_daemon_started_again_is_told_to_the_client_with_the_ends_of_its_pair
         serde_json::Value::Null
     );
     let mut daemon = desk.run(TWO_SPHERES, &[]);
-    // Frames sent into the gap are sent in vain; the client goes on as it is.
+    // Frames sent while there is no daemon are lost; the client reconnects by itself.
     let mut told = None;
     until("the restart", || {
         let rows = [at(1, 0.0), at(2, 0.5)];
@@ -158,14 +158,14 @@ fn a_killed_daemon_started_again_is_told_to_the_client_with_the_ends_of_its_pair
     assert!((pairs[0].gap_best_m + 0.6).abs() < 1e-9);
     assert_eq!(daemon.stop().0.code(), Some(0), "{}", daemon.stderr());
     drop(client);
-    // A daemon and its next one have come and gone, one of them by force.
+    // One daemon was killed and the next one ended; neither leaves files.
     let next = desk.run(TWO_SPHERES, &[]);
     tick_until(&mut desk.client(None), "the next", |_| true);
     drop(next);
     assert_eq!(desk.files(), Vec::<std::path::PathBuf>::new());
 }
 
-/// A pipe that takes not a byte more, and the end that nobody reads.
+/// A full pipe: its read end, which nobody reads, and its write end.
 fn full_pipe() -> (std::io::PipeReader, std::io::PipeWriter) {
     use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
     let (reader, mut writer) = std::io::pipe().unwrap();
@@ -182,7 +182,7 @@ fn full_pipe() -> (std::io::PipeReader, std::io::PipeWriter) {
 fn a_daemon_whose_tick_thread_is_stuck_ends_with_code_5_and_the_next_one_starts() {
     let desk = Desk::new();
     let scene = desk.scene(TWO_SPHERES);
-    // Its first line of log is never taken: the thread that writes it is stuck for good.
+    // Its first log line is never read, so the thread that writes it is stuck for ever.
     let (_unread, log) = full_pipe();
     let child = sweepd()
         .args(["run", scene.to_str().unwrap(), "--watchdog", "2s"])
@@ -220,7 +220,7 @@ fn bug_the_watchdog_ended_a_daemon_without_a_word_where_the_log_was_held_up() {
         names.any(|name| name.trim_end() == "sweepd-last")
     };
     until("the watchdog ends it", is_ending);
-    // From now on the log is taken, after a line that the thread that is stuck holds it with.
+    // From here on the log is read; the stuck thread holds the lock on it until its line is written.
     let reader = std::thread::spawn(move || {
         let mut text = String::new();
         std::io::Read::read_to_string(&mut log, &mut text).unwrap();
@@ -228,7 +228,7 @@ fn bug_the_watchdog_ended_a_daemon_without_a_word_where_the_log_was_held_up() {
     });
     assert_eq!(finish(child).status.code(), Some(5));
     let text = reader.join().unwrap();
-    // The thread that was stuck may log more behind it before the process has ended.
+    // The thread that was stuck may log more lines after this one before the process ends.
     let last = "sweepd: the tick thread makes no progress: the daemon ends, start it again";
     let text = text.trim_start_matches('.');
     assert!(text.lines().any(|line| line == last), "{text}");
@@ -245,7 +245,8 @@ fn bug_a_signal_while_a_start_waits_for_shared_memory_was_told_as_a_failure() {
         .find(|path| path.extension().is_some_and(|ending| ending == "service"))
         .unwrap();
     assert_eq!(daemon.stop().0.code(), Some(0), "{}", daemon.stderr());
-    // iceoryx2 waits for whoever makes a service to finish it. One by way of a link is nobody's to remove.
+    // iceoryx2 waits for the creator of a half-made service to complete it. It does not remove a service that is a
+    // symbolic link.
     let elsewhere = desk.dir.join("half_made");
     let half_made = std::fs::File::create(&elsewhere).unwrap();
     let owner = std::fs::Permissions::from_mode(0o600);
@@ -285,7 +286,7 @@ fn a_watchdog_that_would_take_an_idle_daemon_for_a_stuck_one_is_refused() {
     }
 }
 
-/// Nobody gave a --watchdog, and the default was refused.
+/// The default watchdog was refused, although no `--watchdog` was given.
 #[test]
 fn bug_a_long_heartbeat_is_no_reason_to_refuse_the_default_watchdog() {
     let desk = Desk::new();
@@ -329,7 +330,7 @@ fn a_client_of_another_user_is_refused_with_exit_4_and_told_whose_it_is() {
     }
     let desk = Desk::new();
     let _daemon = desk.run(TWO_SPHERES, &[]);
-    // A copy, because the build folder may be closed to others.
+    // A copy, because other users may have no access to the build folder.
     let binary = desk.dir.join("sweepd");
     std::fs::copy(env!("CARGO_BIN_EXE_sweepd"), &binary).unwrap();
     std::fs::set_permissions(&desk.dir, std::fs::Permissions::from_mode(0o755)).unwrap();

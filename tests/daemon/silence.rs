@@ -1,4 +1,4 @@
-//! Silence is never taken for safety: no source, killed sources, a pose that never came.
+//! Silence never counts as safety: no source, killed sources, a pose that never came.
 
 use rustix::process::Signal;
 use std::time::{Duration, Instant};
@@ -8,7 +8,7 @@ use sweepd::wire::{BodyStatus, Reason, State, TickRow};
 
 use crate::live::{Desk, SECOND_NS, at, send, state, tick_until, until, words};
 
-/// Two spheres far apart, each of its own source.
+/// Two spheres far apart, each with its own source.
 fn scene(mode: &str) -> String {
     let mode = if mode.contains('=') {
         mode.to_owned()
@@ -27,10 +27,10 @@ fn scene(mode: &str) -> String {
 }
 
 const MODES: [&str; 3] = ["on_all", "on_frame = \"sim\"", "rate = 20"];
-/// A tick at least each heartbeat of 100 ms, and what a busy machine may add.
+/// Longest time between ticks: the heartbeat of 100 ms, and an allowance for a busy machine.
 const GAP_MAX_NS: u64 = 100_000_000 + SECOND_NS;
 
-/// Listens for a while: every tick is looked at, none may be late.
+/// Receives ticks for a while; calls `each` with every tick, and asserts that none is late.
 fn listen(client: &mut Client, time: Duration, mut each: impl FnMut(&TickRow)) {
     let (start, mut before_ns, mut ticks) = (Instant::now(), None, 0);
     while start.elapsed() < time {

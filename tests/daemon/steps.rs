@@ -1,4 +1,4 @@
-//! Frames in, results out: lockstep, rounds of two sources, a rate.
+//! Frames in, results out: lockstep, rounds of two sources, a fixed rate.
 
 use std::time::Instant;
 
@@ -35,7 +35,7 @@ fn each_step_in_lockstep_has_the_pairs_and_contacts_of_its_own_frame() {
     let mut client = desk.source("sim");
     let mut touched = false;
     for number in 0..60_u32 {
-        // There and back through each other, and apart by 2 m.
+        // The bodies move through each other, and apart by up to 2 m and back.
         let x = 1.5 - (f64::from(number % 30) / 10.0 - 1.5).abs();
         let x = 2.0 * x + 0.2;
         step(&mut client, &[at(1, 0.0), at(2, x)]);
@@ -100,7 +100,7 @@ fn the_time_that_a_frame_leaves_bounds_the_work_of_its_tick() {
             .unwrap();
         *client.view().tick()
     };
-    // They overlap there, which takes work to tell; and here not even their boxes do.
+    // At the first distance the bodies overlap, which takes work to decide; at the second not even their boxes overlap.
     let (touching, apart) = (0.4, 5.0);
     let late_ns = SystemClock.monotonic_ns() + hour_ns;
     for (late, enough) in [
@@ -114,7 +114,7 @@ fn the_time_that_a_frame_leaves_bounds_the_work_of_its_tick() {
         assert!(tick.budget_ns <= hour_ns, "{} ns", tick.budget_ns);
         assert_eq!((tick.possible, tick.overrun), (0, 0));
         assert_eq!(tick_of(&FrameInfo::default(), apart).possible, 0);
-        // Who says nothing has no end.
+        // A frame without a limit leaves the budget unlimited.
         let tick = tick_of(&FrameInfo::default(), touching);
         assert_eq!((tick.possible, tick.budget_ns), (0, u64::MAX));
         tick_of(&FrameInfo::default(), apart);
@@ -129,7 +129,7 @@ fn a_round_of_two_sources_uses_a_frame_of_each() {
         &[],
     );
     let (mut left, mut right) = (desk.source("left"), desk.source("right"));
-    // Both are known to the daemon before rounds are counted: before, it waits for neither.
+    // The daemon waits in a round only for sources it knows, so both send once first.
     send(&mut left, &[at(1, 0.0)]);
     send(&mut right, &[at(2, 5.0)]);
     let used = |client: &mut Client, seqs: [u64; 2]| {
@@ -143,7 +143,7 @@ fn a_round_of_two_sources_uses_a_frame_of_each() {
         send(&mut left, &[at(1, 0.0)]);
         send(&mut right, &[at(2, x)]);
         let seq = u64::from(number) + 1;
-        // A heartbeat on the way leaves the round under way alone.
+        // A heartbeat in between does not disturb the current round.
         let tick = used(&mut left, [seq, seq]);
         assert_eq!(tick.cause, TickCause::Frame.code(), "{}", words(&tick));
         let wanted = if x < 1.0 {
@@ -201,7 +201,7 @@ fn a_reader_that_never_reads_holds_nobody_up() {
         reader.wait_tick(30 * SECOND_NS).unwrap(),
         Heard::Tick
     ));
-    // The one that sleeps has sent nothing: it holds no session.
+    // The sleeping client has sent nothing, so it has no session and the source is free.
     let mut client = desk.source("sim");
     for number in 0..200_u32 {
         step(&mut client, &[at(1, 0.0), at(2, f64::from(number))]);
@@ -214,7 +214,7 @@ fn what_publishing_leaves_of_a_budget_is_used_and_told_in_the_next_tick() {
     let desk = Desk::new();
     let bodies = 1_000;
     let scene = pool(bodies, 5);
-    // How long the floor takes depends on the machine: some budget ends amid the work.
+    // The duration of the floor depends on the machine; one of these budgets ends during the work above it.
     let used = ["1ms", "3ms", "6ms", "12ms", "25ms", "50ms"]
         .iter()
         .any(|budget| {

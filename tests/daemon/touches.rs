@@ -1,4 +1,4 @@
-//! What a body of a running daemon touches or would touch, over the request service.
+//! The bodies that a body of a running daemon touches or would touch, over the request service.
 
 use sweepd::transport::client::Client;
 use sweepd::wire::{Answer, TouchingFound, Verdict};

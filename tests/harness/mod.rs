@@ -1,4 +1,4 @@
-//! Drives an engine without transports: scene text in, frames by a built-in motion, outbox out.
+//! Runs an engine without transports: in, the text of a scene and frames of a built-in motion; out, the outbox.
 
 #![allow(
     dead_code,
@@ -28,7 +28,7 @@ use sweepd::world::{Body, Parts};
 /// Nanoseconds between two frames.
 pub const FRAME_NS: u64 = 10_000_000;
 
-/// An engine, its bodies' motions, and the last outbox.
+/// An engine, the motions of its bodies, and the last outbox.
 pub struct Drive {
     engine: Engine,
     clock: Arc<ManualClock>,
@@ -38,18 +38,18 @@ pub struct Drive {
     source: String,
     seq: u64,
     out: Outbox,
-    /// Bodies that deform, with their vertices at rest.
+    /// Deforming bodies, with their vertices at rest.
     bending: Vec<(u64, Vec<[f32; 3]>)>,
 }
 
 impl Drive {
-    /// An engine for a scene's text; its moving bodies move by `pattern`.
+    /// An engine for the text of a scene; its moving bodies follow `pattern`.
     pub fn new(scene: &str, pattern: Pattern, seed: u64) -> Self {
         let scene = Scene::parse(scene, "scene.toml", Path::new(".")).unwrap();
         Self::of(&scene, pattern, seed)
     }
 
-    /// As [`Drive::new`] for a read scene.
+    /// As [`Drive::new`], for a parsed scene.
     pub fn of(scene: &Scene, pattern: Pattern, seed: u64) -> Self {
         let clock = Arc::new(ManualClock::new(1_000_000_000));
         let shapes = build_shapes(scene).unwrap();
@@ -94,7 +94,7 @@ impl Drive {
         }
     }
 
-    /// Moves all bodies to the poses of frame `tick` and runs a tick.
+    /// Moves all bodies to their poses in frame `tick` and runs a tick.
     pub fn step(&mut self, tick: u64, budget: Budget, demand: Demand) -> &Outbox {
         self.place(tick);
         self.send(budget, demand)
@@ -125,7 +125,7 @@ impl Drive {
         armed.with(|armed| armed.set(false));
     }
 
-    /// Moves all bodies to the poses of frame `tick`.
+    /// Sets the poses of all bodies to those of frame `tick`.
     pub fn place(&mut self, tick: u64) {
         #[allow(clippy::cast_precision_loss, reason = "small counts")]
         let time_s = tick as f64 * 0.01;
@@ -142,13 +142,13 @@ impl Drive {
         self.rows[at].orientation = [q.x, q.y, q.z, q.w];
     }
 
-    /// Sends the rows as they are and runs a tick.
+    /// Sends the current rows as a frame and runs a tick.
     pub fn send(&mut self, budget: Budget, demand: Demand) -> &Outbox {
         self.fill();
         self.tick(budget, demand, TickCause::Frame)
     }
 
-    /// Fills the inbox with a full frame of the rows as they are.
+    /// Fills the inbox with a full frame of the current rows, and with the vertices.
     fn fill(&mut self) {
         self.clock.advance(FRAME_NS);
         self.seq += 1;
@@ -169,7 +169,7 @@ impl Drive {
         self.bend();
     }
 
-    /// The newest vertices of each body that deforms, by the order of bodies: a wave goes through them.
+    /// The vertices of each deforming body as last sent, in the order of the bodies: at rest plus a travelling wave.
     pub fn bent(&self) -> Vec<Vec<[f32; 3]>> {
         #[allow(clippy::cast_precision_loss, reason = "small counts")]
         let phase = (self.seq % 150) as f32 * (std::f32::consts::TAU / 150.0);
@@ -244,7 +244,7 @@ impl Drive {
     }
 }
 
-/// Bodies that deform, with their vertices as the scene has them.
+/// Deforming bodies, with their vertices in the scene.
 fn bending(scene: &Scene, shapes: &[Parts]) -> Vec<(u64, Vec<[f32; 3]>)> {
     let bodies = scene.bodies.iter().zip(shapes);
     let bent = bodies.filter(|(body, _)| body.deforms);
@@ -262,7 +262,7 @@ fn bending(scene: &Scene, shapes: &[Parts]) -> Vec<(u64, Vec<[f32; 3]>)> {
     .collect()
 }
 
-/// The gap of two bodies of one convex shape or half-space each, by a cold exact query.
+/// The gap of two bodies that consist of one convex shape or half-space each, by a cold exact query.
 pub fn exact_gap(a: &Body, b: &Body) -> Interval {
     let place = |body: &Body| body.pose * body.shapes[0].pose;
     let (one, other) = (&a.shapes[0].shape.geometry, &b.shapes[0].shape.geometry);

@@ -1,4 +1,4 @@
-//! What engines say, held against the world as the test sees it.
+//! Compares the results of the engines with the test's own world.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,17 +8,17 @@ use sweepd::wire::{BodyStatus, Event, Outbox, PairRow, State, Verdict, pair_flag
 use crate::twins::{ENGINES, Twins};
 use crate::world::World;
 
-/// Poses looked at on the way of a pair.
+/// Poses sampled on the way of a pair.
 const LOOKS: u32 = 24;
-/// What a sampled overlap must be at least, and an interval may be off by, of the coordinates.
+/// Least depth of a sampled overlap, and tolerance of intervals, relative to the coordinates.
 const NOISE: f64 = 1e-9;
 
 type Key = (u64, u64);
 
-/// What was seen so far, and the collisions that have begun and not ended, by engine.
+/// Counters so far, and per engine the collisions that have begun and not ended.
 #[derive(Default)]
 pub struct Seen {
-    /// Refused and taken.
+    /// Number of refused and of applied edits.
     pub edits: [u64; 2],
     begun: [BTreeSet<Key>; ENGINES],
     pair_ticks: u64,
@@ -45,7 +45,7 @@ impl Seen {
         );
     }
 
-    /// The test would say nothing of what does not happen.
+    /// Asserts that every kind of case occurred; otherwise the test would prove nothing about it.
     pub fn assert_enough(&self, ticks: u64) {
         assert!(self.pair_ticks > 4 * ticks, "{} pairs", self.pair_ticks);
         assert!(self.colliding > ticks / 2, "{} overlap", self.colliding);
@@ -59,7 +59,7 @@ impl Seen {
         assert!(self.edits[1] > ticks / 3, "{:?} edits", self.edits);
     }
 
-    /// After a tick.
+    /// Checks all engines after a tick.
     pub fn check(&mut self, world: &World, twins: &Twins, what: &str) {
         if world.before.is_empty() {
             self.begun = Default::default();
@@ -103,7 +103,7 @@ impl Seen {
             let has = |event: Event| row.events & event.bit() != 0;
             let passed = has(Event::Passed);
             if passed {
-                // Whatever was before, it is over.
+                // Any earlier contact of the pair has ended with this event.
                 begun.remove(&key);
                 continue;
             }
@@ -126,7 +126,7 @@ impl Seen {
         }
     }
 
-    /// Of each collision that has begun there is a row, and each that is certified has begun.
+    /// Each collision that has begun must have a row, and each certified collision must have begun.
     fn check_begun(&self, at: usize, pairs: &[Pair], rows: &BTreeMap<Key, &PairRow>, what: &str) {
         let begun = &self.begun[at];
         for key in begun {
@@ -150,28 +150,28 @@ impl Seen {
     }
 }
 
-/// The verdict of a row that speaks of this tick's poses.
+/// The verdict of a row, if it is about this tick's poses.
 fn said(row: &PairRow) -> Option<Verdict> {
     let verdict = Verdict::from_code(row.verdict).unwrap();
     (row.flags & pair_flags::GONE == 0 && verdict != Verdict::None).then_some(verdict)
 }
 
-/// A pair of bodies that are there.
+/// A pair of bodies of the scene.
 struct Pair {
     key: Key,
     checked: bool,
-    /// Both places are, or are held to be.
+    /// Both poses are known or held.
     is_known: bool,
-    /// Neither has a place in the scene now.
+    /// At least one of the bodies has no place in the scene now.
     is_out: bool,
     reach_m: f64,
-    /// At this tick's poses, where both are placed.
+    /// Gap at this tick's poses, if the pair is checked.
     gap: Interval,
     is_mesh: bool,
     noise_m: f64,
-    /// The least gap seen on the way here; infinite where there is no way.
+    /// The least gap sampled on the way of this tick; infinite if no way was sampled.
     way_m: f64,
-    /// It is not told here how they came.
+    /// The way of the pair is unknown to this test.
     any_way: bool,
 }
 
@@ -213,7 +213,7 @@ impl Pair {
     fn look_on_the_way(&mut self, world: &World) {
         let (a, b) = self.key;
         let (Some(way_a), Some(way_b)) = (Way::of(world, a), Way::of(world, b)) else {
-            // One of them was not there.
+            // One of the bodies had no known pose.
             self.any_way = true;
             return;
         };
@@ -225,7 +225,7 @@ impl Pair {
             let share = f64::from(look) / f64::from(LOOKS);
             let gap = one.gap(&way_a.at(share), other, &way_b.at(share));
             if look == 0 && gap.min < self.noise_m {
-                // What touched already is no news on the way.
+                // A pair that touched at the start of the way is no new contact.
                 self.any_way = true;
                 return;
             }
@@ -241,7 +241,7 @@ impl Pair {
         self.is_known && self.way_m < -self.noise_m
     }
 
-    /// * `done` - the engine had no limit.
+    /// * `done` - whether the engine had no limit.
     fn compare(&self, row: Option<&PairRow>, done: bool, what: &str) {
         let verdict = row.and_then(said);
         let tell = |fault: &str| -> String {
@@ -281,7 +281,7 @@ impl Pair {
             tell("left open")
         );
         if let (Some(_), Some(row)) = (verdict, row) {
-            // How deep a mesh is in something is another measure, and never a greater one.
+            // The depth of a mesh is measured differently, and is never greater than that of its convex twin.
             let shallow = if self.is_mesh {
                 self.gap.max.max(0.0)
             } else {
@@ -297,18 +297,18 @@ impl Pair {
     }
 }
 
-/// How a body came from where it was in the last tick.
+/// The motion of a body from its pose in the last tick.
 struct Way {
     from: Pose,
     to: Pose,
-    /// Seen from what it hangs on in the end.
+    /// Pose in the frame of the root that the body is attached to.
     local: Pose,
     pivot: Point,
     is_swept: bool,
 }
 
 impl Way {
-    /// `None` where its place was not known in the last tick or is not now.
+    /// `None` if the pose was not known in the last tick, or is not now.
     fn of(world: &World, id: u64) -> Option<Self> {
         let (root, local) = world.root(id);
         let before = world.before.get(&id)?;
@@ -325,7 +325,7 @@ impl Way {
         })
     }
 
-    /// What is not continuous is where it came to.
+    /// A body that is not continuous is at its final pose all the time.
     fn at(&self, share: f64) -> Pose {
         if !self.is_swept {
             return self.to * self.local;

@@ -1,4 +1,4 @@
-//! Draws what happens: bodies, edits, frames, silences.
+//! Draws the events of a scene: bodies, edits, frames, silences.
 
 use std::sync::Arc;
 
@@ -14,27 +14,27 @@ use crate::solids::Solid;
 use crate::twins::{Sent, Twins};
 use crate::world::World;
 
-/// Names there are: few, or so many that the plan changes its broad phase back and forth.
+/// Number of names: few, or so many that the plan switches its broad phase back and forth.
 const BODIES: [usize; 4] = [10, 10, 10, 40];
-/// Edits of a tick, drawn; with many names now and then more.
+/// Number of edits per tick, drawn; with many names occasionally up to [`BURST`].
 const EDITS: [usize; 8] = [0, 0, 0, 1, 1, 2, 2, 4];
 const BURST: usize = 14;
 
-/// What a scene is about.
+/// The state of a scene.
 struct Draw {
     rng: Rng,
     twins: Twins,
     world: World,
     bodies: usize,
-    /// Whether more bodies come than go.
+    /// Whether more bodies are put than removed.
     grows: bool,
-    /// How far bodies are from the scene's origin, metres.
+    /// Distance of the bodies from the scene's origin, metres.
     place_m: f64,
-    /// Bodies that are not sent for some ticks.
+    /// Bits of the bodies that are not sent for some ticks.
     silent: u64,
 }
 
-/// A scene of so many ticks.
+/// Runs a scene for `ticks` ticks.
 pub fn scene(seed: u64, ticks: u64, seen: &mut Seen) {
     let mut rng = Rng::new(seed.wrapping_mul(0x9e37_79b9) + 1);
     let place_m = [0.0, 0.0, 1e3, 1e5][rng.below(4)];
@@ -70,7 +70,7 @@ impl Draw {
                 std::iter::once(drawn).chain(released.map(|edit| (edit, None)))
             })
             .collect();
-        // Each a request of its own, or all of them one.
+        // Each edit in its own request, or all edits in one.
         let together = if self.rng.below(2) == 0 {
             drawn.len().max(1)
         } else {
@@ -84,7 +84,7 @@ impl Draw {
             self.frame();
         }
         let taken = self.twins.tick(&requests, &mut self.rng);
-        // Edits go before frames, at the begin of the tick.
+        // A tick applies edits before frames.
         self.world.now_ns = now_ns;
         for (request, taken) in drawn.chunks(together).zip(taken) {
             seen.edits[usize::from(taken)] += request.len() as u64;
@@ -119,18 +119,18 @@ impl Draw {
         format!("b{}", self.id())
     }
 
-    /// What a put asks for; 0: nothing.
+    /// The id that a put asks for; 0: none.
     fn asked_id(&mut self, name: &str) -> u64 {
         let known = self.world.ids.get(name).copied();
         match (self.rng.below(8), known) {
             (0..=3, _) => 0,
             (4..=6, Some(known)) => known,
-            // As often as not another has it.
+            // Another body usually has this id.
             _ => self.id(),
         }
     }
 
-    /// A place in a room that is too small for all.
+    /// A random pose in a space too small for all bodies.
     fn place(&mut self) -> Pose {
         let room_m = if self.bodies > BODIES[0] { 3.5 } else { 2.0 };
         let at = self.rng.vector(room_m) + Vec3::new(self.place_m, 0.0, 0.0);
@@ -139,7 +139,7 @@ impl Draw {
 
     fn edit(&mut self) -> (Edit, Option<Solid>) {
         let (name, other) = (self.name(), self.name());
-        // Kinds of edits: many bodies come, or go.
+        // Scenes with many bodies draw more puts while they grow, and more removals while they shrink.
         let kind = match self
             .rng
             .below(if self.bodies > BODIES[0] { 32 } else { 16 })
@@ -199,7 +199,7 @@ impl Draw {
         (edit, None)
     }
 
-    /// Now and then what is hung on another is let go at once, whatever is known of that.
+    /// Sometimes an attached body is detached in the next edit, whether or not its pose is known.
     fn release(&mut self, edit: &Edit) -> Option<Edit> {
         match edit {
             Edit::Attach { name, to, .. } if to.is_some() && self.rng.below(3) == 0 => {
@@ -254,13 +254,13 @@ impl Draw {
                 continue;
             }
             let Some(thing) = self.world.things.get(&id) else {
-                // Whose body is not there, or will be.
+                // No body has this id yet.
                 rows.push((id, Some(self.place())));
                 continue;
             };
             let (placed, now) = (thing.placed, thing.pose);
             let pose = match self.rng.below(12) {
-                // As it was.
+                // The pose is unchanged.
                 0..=2 if placed => now,
                 3..=7 if placed => {
                     let step_m = [1e-4, 0.02, 0.2][self.rng.below(3)];
@@ -279,7 +279,7 @@ impl Draw {
     }
 }
 
-/// An edit in some words.
+/// An edit as short text.
 fn tell(edit: &Edit) -> String {
     match edit {
         Edit::Put(Put { body, .. }) => {

@@ -1,13 +1,14 @@
-//! Goal: no order of frames, silences and edits makes an engine say what is not so (laws 1, 3.4 to 3.7, 3.10, 4.2).
-//! Method: scenes of all kinds of bodies, half-spaces that cannot move and such that do, parts far from their body's
-//! centre, continuous bodies; in each tick any of them may be put anew, removed, disabled, hung on another (which may
-//! be disabled, unknown or a half-space), let go, filtered, reset, sent, sent wrong, or be silent for too long. Three
-//! engines are given the same (work without limit, up to a random stop, none at all) and have broad phases of their
-//! own; some scenes have so many bodies that the plan changes its own back and forth. What they say is held against a
-//! world of a few lines (`world.rs`) that shares no code with theirs, and exact queries at its poses, on the way there
-//! too (`check.rs`).
+//! Goal: no order of frames, silences and edits makes an engine publish a wrong result (laws 1, 3.4 to 3.7, 3.10, 4.2).
+//! Method: scenes with all kinds of bodies: fixed and moving half-spaces, parts far from their body's centre,
+//! continuous bodies. In each tick any body may be put again, removed, disabled, attached to another (which may be
+//! disabled, unknown or a half-space), detached, filtered, reset, sent, sent with invalid numbers, or silent for too
+//! long. Three engines get the same input (with unlimited work, a random limit, and none) and have different broad
+//! phases; some scenes have so many bodies that the plan switches its own back and forth. Their results are compared
+//! with a small world (`world.rs`) that shares no code with them, and with exact queries at its poses and on the way to
+//! them (`check.rs`).
 //!
-//! `SWEEPD_TICKS` says how many ticks; `SWEEPD_SEED` where to start. The ignored one is the same with 100,000.
+//! `SWEEPD_TICKS` sets the number of ticks, `SWEEPD_SEED` the first seed. The ignored test is the same with 100,000
+//! ticks.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -31,7 +32,7 @@ mod world;
 
 use check::Seen;
 
-/// Ticks of a scene.
+/// Ticks per scene.
 const TICKS: u64 = 150;
 
 #[test]

@@ -1,4 +1,4 @@
-//! Bodies of all kinds as scene text, with the convex pieces that their gaps are asked of.
+//! Bodies of all kinds as scene text, with convex pieces for exact gap queries.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,15 +13,15 @@ use sweepd::world::Parts;
 use crate::oracle::meshes::{cuboid, trimesh};
 use crate::oracle::rng::Rng;
 
-/// A body's shapes, as the engine gets them and as the oracle asks them.
+/// A body's shapes, as the engine gets them and as the oracle queries them.
 #[derive(Clone)]
 pub struct Solid {
     pub spec: BodySpec,
     pub shapes: Parts,
-    /// Convex, or one half-space; with their places in the body.
+    /// Convex shapes, or one half-space, with their poses in the body.
     pieces: Vec<(Pose, Arc<Shape>)>,
     pub is_half_space: bool,
-    /// How deep the pieces of a mesh overlap is not how deep it does.
+    /// Whether it is a mesh, whose depth of overlap differs from that of its pieces.
     pub is_mesh: bool,
 }
 
@@ -34,7 +34,7 @@ fn read(text: &str) -> (BodySpec, Parts) {
 }
 
 impl Solid {
-    /// A body of a random kind; `name` is its own, the rest is the caller's.
+    /// A body of a random kind with this name; the caller sets the other properties.
     pub fn any(rng: &mut Rng, name: &str) -> Self {
         let half = Vec3::new(
             rng.range(0.2, 0.6),
@@ -79,7 +79,7 @@ impl Solid {
             if kind < 6 {
                 return format!("{head}shape = {shape}\n");
             }
-            // Two parts, or one of them far from the body's origin.
+            // Two parts; they may be far from the body's origin.
             let at = [far_m + 0.7, 0.0, 0.1];
             let inside = shape.trim_end_matches(" }");
             format!(
@@ -100,7 +100,7 @@ impl Solid {
         }
     }
 
-    /// The least gap of two, placed.
+    /// The least gap of two solids at these poses.
     pub fn gap(&self, at: &Pose, other: &Self, other_at: &Pose) -> Interval {
         let mut least = Interval {
             min: f64::INFINITY,
@@ -117,7 +117,8 @@ impl Solid {
         least
     }
 
-    /// A point in the middle of its geometry, body frame: by the boxes of its pieces.
+    /// Centre of its geometry, body frame: the middle of the bounding box of the centres of its pieces; the origin for
+    /// a half-space.
     pub fn centre(&self) -> Point {
         match &self.pieces[..] {
             [_] if self.is_half_space => Point::origin(),

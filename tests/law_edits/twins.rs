@@ -1,4 +1,4 @@
-//! Three engines that are given the same and have more or less time for it.
+//! Three engines that get the same input and different budgets.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,10 +14,10 @@ use sweepd::world::Edit;
 
 use crate::oracle::rng::Rng;
 
-/// What they have: no limit, a stop at random, nothing.
+/// Their budgets: unlimited, a random limit, none.
 pub const ENGINES: usize = 3;
 
-/// What scenes say of the broad phase; nothing: the plan chooses.
+/// Broad phases as scene text; empty: the plan chooses.
 const METHODS: [&str; 4] = [
     "",
     "[run]\nbroad_phase = \"order\"\n",
@@ -34,14 +34,14 @@ pub struct Twins {
     sent: Option<Sent>,
 }
 
-/// A frame: whether it begins an epoch, and its rows; without a pose: one that holds no numbers.
+/// A frame: whether it begins an epoch, and its rows; a row without a pose is sent with NaN.
 pub struct Sent {
     pub is_anew: bool,
     pub rows: Vec<(u64, Option<Pose>)>,
 }
 
 impl Twins {
-    /// The first has the broad phase of the plan, the others one that is drawn.
+    /// The first engine has the broad phase of the plan, the others a random one.
     pub fn new(rng: &mut Rng) -> Self {
         let clock = Arc::new(ManualClock::new(1_000_000_000));
         let engine = |at: usize| {
@@ -63,7 +63,7 @@ impl Twins {
         }
     }
 
-    /// Time goes on, without a frame.
+    /// Advances the clock and drops the last frame.
     pub fn wait(&mut self, ns: u64) -> u64 {
         self.clock.advance(ns);
         self.inbox.clear();
@@ -71,7 +71,7 @@ impl Twins {
         self.clock.boottime_ns()
     }
 
-    /// The frame of the next tick.
+    /// Sets the frame of the next tick.
     pub fn send(&mut self, sent: Sent, full: bool) {
         self.epoch += u64::from(sent.is_anew);
         self.seq += 1;
@@ -95,14 +95,14 @@ impl Twins {
         self.sent = Some(sent);
     }
 
-    /// The frame of the last tick.
+    /// Takes the frame of the last tick.
     pub fn take_sent(&mut self) -> Option<Sent> {
         self.sent.take()
     }
 
-    /// A tick of each, with requests of edits.
+    /// Runs a tick of each engine, with requests of edits.
     ///
-    /// * returns - which of them were taken.
+    /// * returns - whether each request was applied.
     pub fn tick(&mut self, requests: &[Vec<Edit>], rng: &mut Rng) -> Vec<bool> {
         let batches: Vec<EditBatch> = (1..)
             .zip(requests)

@@ -1,4 +1,4 @@
-//! The world as the test sees it: what each body is, what was last said of it, and on what it hangs.
+//! The test's own world: the properties of each body, its last input, and its attachment.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,9 +10,9 @@ use sweepd::world::{Edit, Put};
 
 use crate::solids::Solid;
 
-/// Of the source, as the scene says.
+/// Timeout of the source in the scene.
 const TIMEOUT_NS: u64 = 500_000_000;
-/// What may have got farther is as good as anywhere: the default of scenes.
+/// A stale body that may have moved farther may be anywhere: the default of scenes, metres.
 const STALE_REACH_M: f64 = 1.0;
 
 pub struct Thing {
@@ -20,16 +20,16 @@ pub struct Thing {
     pub enabled: bool,
     pub group: u32,
     pub mask: u32,
-    /// The body it hangs on, and its pose there.
+    /// The body that it is attached to, and its pose there.
     pub hangs: Option<(u64, Pose)>,
-    /// Where it is, where it hangs on none.
+    /// Its pose, if it is attached to none.
     pub pose: Pose,
     pub placed: bool,
     pub refused: bool,
     pub since_ns: u64,
 }
 
-/// Where a body was in the last tick.
+/// Pose and status of a body in the last tick.
 #[derive(Clone, Copy)]
 pub struct Before {
     pub pose: Pose,
@@ -39,20 +39,20 @@ pub struct Before {
 #[derive(Default)]
 pub struct World {
     pub things: BTreeMap<u64, Thing>,
-    /// Check or not, and the two; the last that matches wins.
+    /// Rules: whether to check, and the two bodies; the last matching rule applies.
     rules: Vec<(bool, u64, u64)>,
     pub now_ns: u64,
     pub before: BTreeMap<u64, Before>,
-    /// Since the last tick something else than frames changed it.
+    /// Whether anything but frame rows has changed the world since the last tick.
     pub edited: bool,
     /// The id of each name that ever had a body.
     pub ids: BTreeMap<String, u64>,
-    /// Where bodies were before a request, or are put by it.
+    /// Poses of bodies before a request, or as put by it.
     found: BTreeMap<u64, Pose>,
 }
 
 impl World {
-    /// As the engine is after its last tick.
+    /// Stores the state after a tick as that of the last tick.
     pub fn end_tick(&mut self) {
         let now = |id: &u64| Before {
             pose: self.pose(*id),
@@ -62,7 +62,7 @@ impl World {
         self.edited = false;
     }
 
-    /// The body it hangs on in the end, and its pose there.
+    /// The root body that it is attached to, directly or through others, and its pose there.
     pub fn root(&self, id: u64) -> (u64, Pose) {
         let (mut at, mut pose) = (id, Pose::identity());
         while let Some((to, local)) = self.things[&at].hangs {
@@ -103,7 +103,7 @@ impl World {
         }
     }
 
-    /// How far it may be from where it was last seen, metres.
+    /// Greatest distance from its last known position, metres.
     pub fn reach_m(&self, id: u64) -> f64 {
         let age_ns = self.now_ns - self.things[&self.root(id).0].since_ns;
         match (self.status(id), self.things[&id].solid.spec.max_speed_mps) {
@@ -115,7 +115,7 @@ impl World {
         }
     }
 
-    /// Whether a pair of bodies that are there is to be checked, whatever is known of their places.
+    /// Whether a pair of bodies is to be checked, regardless of their poses.
     pub fn is_checked(&self, a: u64, b: u64) -> bool {
         let (one, other) = (&self.things[&a], &self.things[&b]);
         if !(one.enabled && other.enabled)
@@ -134,12 +134,12 @@ impl World {
             && other.group & one.mask != 0
     }
 
-    /// 0: of a name that never had a body; something may hang on that amid a request.
+    /// The id of a name; 0 if it never had a body: within a request a body may be attached to such a name.
     fn id_of(&self, name: &str) -> u64 {
         self.ids.get(name).copied().unwrap_or(0)
     }
 
-    /// Gives the names of a request their ids: first those asked for, then in their order the least that are free.
+    /// Assigns ids to the names of a request: first those asked for, then the least free ones, in order.
     fn take_ids<'a>(&mut self, edits: impl Iterator<Item = &'a Edit>) {
         let (mut asked, mut others) = (Vec::new(), Vec::new());
         for edit in edits {
@@ -163,15 +163,16 @@ impl World {
         assert_eq!(each.len(), self.ids.len(), "an id of two names");
     }
 
-    /// A request that the engines took begins.
+    /// Begins a request that the engines applied.
     pub fn begin_request<'a>(&mut self, edits: impl Iterator<Item = &'a Edit>) {
         self.take_ids(edits);
         let found = |id: &u64| (*id, self.pose(*id));
         self.found = self.things.keys().map(found).collect();
     }
 
-    /// The body that one hangs on in the end amid a request, and where that puts it. Where one that it hangs on is
-    /// gone, or they hang on each other: none, and by where the last that is there was before.
+    /// Within a request: the root that a body is attached to, and the resulting pose. If a body on the way to the root
+    /// is missing, or the attachments form a cycle: no root, and the pose that follows from the last present body's
+    /// pose before the request.
     fn by_now(&self, id: u64) -> (Option<u64>, Pose) {
         let (mut at, mut pose) = (id, Pose::identity());
         for _ in 0..=self.things.len() {
@@ -187,7 +188,7 @@ impl World {
         (None, self.found[&at] * pose)
     }
 
-    /// What an edit that an engine took makes of it.
+    /// Applies an edit that the engines applied.
     pub fn apply(&mut self, edit: &Edit, solid: Option<Solid>) {
         self.edited = true;
         match edit {
@@ -249,7 +250,7 @@ impl World {
         }
     }
 
-    /// Whether it was received once, and not since.
+    /// Whether it has been received, but its last pose is older than the timeout.
     fn is_too_old(&self, id: u64) -> bool {
         let thing = &self.things[&id];
         thing.solid.spec.moves && thing.placed && self.now_ns - thing.since_ns >= TIMEOUT_NS
@@ -282,7 +283,7 @@ impl World {
         self.found.insert(id, at);
     }
 
-    /// All poses of frames are forgotten.
+    /// Discards all poses received in frames.
     pub fn reset(&mut self) {
         self.edited = true;
         for thing in self.things.values_mut() {
@@ -292,7 +293,7 @@ impl World {
         }
     }
 
-    /// A row of a frame; `None`: one that holds no numbers.
+    /// Applies a row of a frame; `None`: a row without valid numbers.
     pub fn take_row(&mut self, id: u64, pose: Option<&Pose>) {
         let now_ns = self.now_ns;
         let Some(thing) = self.things.get_mut(&id) else {

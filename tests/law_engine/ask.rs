@@ -1,4 +1,5 @@
-//! A gap asked for beside the pair set: sound wherever its work stops, and in the end that of the pair.
+//! Questions for a gap, outside the pair set: the answer is sound wherever its work stops, and equals that of the pair
+//! at the end.
 
 use sweepd::narrow::gap_between;
 use sweepd::query::{GapQuestion, Query};
@@ -28,7 +29,7 @@ fn two(rig: &Rig) -> (&Body, &Body) {
 fn an_answer_is_sound_after_any_number_of_units_and_exact_after_all() {
     let clock = ManualClock::new(0);
     let pea = "{ type = \"sphere\", radius = 0.1 }";
-    // Shapes, where the second one is, and the gap by hand.
+    // Shapes, position of the second one, and the gap computed by hand.
     let cases = [
         (PYRAMID, pea, [0.0, 0.0, 1.3], 0.2),
         (pea, DUMBBELL, [0.0, 2.0, 0.0], 5.0_f64.sqrt() - 0.4),
@@ -102,7 +103,7 @@ fn an_answer_is_that_of_the_pair_at_the_tick_s_poses() {
             found.known.gap_max_m.unwrap(),
         );
         assert!((low - row.gap_min_m).abs() < 1e-9 && (high - row.gap_max_m).abs() < 1e-9);
-        // The other way round: from the dumbbell down to the pyramid.
+        // In reverse order: the normal points from the dumbbell down to the pyramid.
         assert!(
             found.known.normal.unwrap()[2] < 0.0
                 && found.known.point_a.unwrap()[2] > found.known.point_b.unwrap()[2]
@@ -110,7 +111,7 @@ fn an_answer_is_that_of_the_pair_at_the_tick_s_poses() {
     }
 }
 
-/// A cube of side 1, each side in `n` times `n` squares of two triangles.
+/// A cube of side 1 m, each side divided into `n` times `n` squares of two triangles.
 fn cube(n: usize) -> String {
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
     for axis in 0..3 {
@@ -143,7 +144,7 @@ fn bug_solids_that_overlap_along_faces_in_line_are_no_touch() {
     let octahedron = "{ type = \"trimesh\", solid = true, vertices = [[0.5, 0, 0], [-0.5, 0, 0], [0, 0.5, 0], [0, -0.5, 0], [0, 0, 0.5], [0, 0, -0.5]], faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]] }";
     let (plain, fine) = (&*cube(1), &*cube(4));
     let boxy = "{ type = \"box\", half_extents = [0.5, 0.5, 0.5] }";
-    // Shapes, where the second one is, and how deep they are at most; 0: they touch.
+    // Shapes, position of the second one, and the greatest possible depth; 0: they touch.
     let cases = [
         (plain, plain, [0.0; 3], 0.5),
         (plain, plain, [0.5, 0.0, 0.0], 0.5),
@@ -174,7 +175,7 @@ fn bug_solids_that_overlap_along_faces_in_line_are_no_touch() {
         assert_eq!(asked.touching, depth == 0.0, "{what}");
         assert_eq!(asked.gap.max <= 0.0, depth > 0.0, "{what}");
         assert!(asked.gap.max >= -depth - 1e-9, "{what}");
-        // And so from tick to tick.
+        // The ticks of the engine agree.
         rig.send(ALL);
         assert_eq!(rig.verdict(1, 2), Verdict::Colliding, "{what}");
         let row = rig.pair(1, 2).unwrap();
@@ -183,7 +184,7 @@ fn bug_solids_that_overlap_along_faces_in_line_are_no_touch() {
     }
 }
 
-/// A tent of 2 m that hangs over the first body.
+/// A tent of side 2 m above the first body.
 const TENT: &str = "{ type = \"trimesh\", solid = false, vertices = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [0, 0, 1]], faces = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]] }";
 
 fn bent(version: u64, rows: Vec<[f32; 3]>) -> VertexFrame {
@@ -247,7 +248,7 @@ fn bug_boxes_that_no_pair_has_had_fitted_are_fitted_for_a_question() {
     let ask = |asked: Question| {
         let header = rig.out.tick.header;
         let query = Query::new(world, header, &asked, None).unwrap();
-        // Each look at the clock takes so long that few are left.
+        // Each clock read takes so long that only a few fit in the time limit.
         let clock = ManualClock::new(1);
         clock.step_each_read(20_000_000);
         query.answer(&clock)

@@ -1,4 +1,4 @@
-//! What contact rows say of convex bodies: corners, intervals, ids.
+//! Contact rows of convex bodies: corners, intervals, ids.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
@@ -9,7 +9,7 @@ use sweepd::wire::{Verdict, contact_flags};
 use crate::oracle::rng::Rng;
 use crate::rig::{ALL, NONE, Rig, body, scene};
 
-/// A box of half a side `half` and 1 m high, of this id.
+/// A box of half width `half` and height 1 m, with this id.
 fn cuboid(id: u64, half: f64) -> String {
     let shape = format!("{{ type = \"box\", half_extents = [{half}, {half}, 0.5] }}");
     body(id, [0.0; 3], &shape, "")
@@ -40,8 +40,8 @@ fn bug_a_small_box_on_a_large_one_lost_a_corner_where_it_had_the_smaller_id() {
 fn bug_contacts_of_shapes_far_from_their_bodies_had_intervals_without_the_truth() {
     let mut rng = Rng::new(6);
     for case in 0..20 {
-        // One ball a kilometre from its body's origin, about which the body is turned by a quarter: exact in f64 but
-        // for the sum.
+        // One ball is a kilometre from its body's origin, and the body is turned by 90 degrees about that origin: exact
+        // in f64 except for the sum.
         let off = 1000.0 + rng.range(0.0, 1.0);
         let far = format!("{{ type = \"sphere\", radius = 1.0, position = [{off:?}, 0, 0] }}");
         let near = "{ type = \"sphere\", radius = 1.0 }";
@@ -61,10 +61,10 @@ fn bug_contacts_of_shapes_far_from_their_bodies_had_intervals_without_the_truth(
     }
 }
 
-/// How far a body moves and turns from tick to tick, metres and radians.
+/// Motion and rotation of a body from tick to tick, metres and radians.
 const TREMBLES: [f64; 5] = [0.0, 1e-16, 1e-15, 1e-14, 1e-12];
 
-/// A box with a side of 2 `half`, as a box or as the hull of its corners.
+/// A block of width 2 `half`, as a box or as the hull of its corners.
 fn block(half: f64, hull: bool) -> String {
     if !hull {
         return format!("{{ type = \"box\", half_extents = [{half}, {half}, 0.5] }}");
@@ -80,8 +80,8 @@ fn block(half: f64, hull: bool) -> String {
     )
 }
 
-/// Sends one frame after the other in which body 2 is at a pose, but for this much; its contacts are so many in each,
-/// with the same ids.
+/// Sends frames with body 2 at a pose plus random motion of size `by`; asserts that each tick has the same number of
+/// contacts with the same ids.
 fn assert_stays(
     rig: &mut Rig,
     what: &str,
@@ -93,7 +93,7 @@ fn assert_stays(
     let mut before = Vec::new();
     for tick in 0..40 {
         let mut at = pose.translation.vector + rng.vector(by);
-        // Beyond rounding it sinks in, or the two would be apart.
+        // For motion beyond rounding the body is lowered, since the two would be apart otherwise.
         at.z -= if by > 1e-15 { 2.0 * by } else { 0.0 };
         let turn = Quat::from_scaled_axis(rng.vector(by)) * pose.rotation;
         rig.place(2, &Pose::from_parts(at.into(), turn));
@@ -132,14 +132,14 @@ fn bug_a_box_at_rest_on_another_lost_corners_to_rounding() {
     }
 }
 
-/// A floor with its top at z = 0, and a body of id 2 with a shape.
+/// A floor with its top at z = 0, and body 2 with this shape.
 fn on_floor(floor: u64, shape: &str) -> Rig {
     let plane = "{ type = \"half_space\", normal = [0, 0, 1], offset = 0 }";
     let floor = format!("name = \"floor\"\nid = {floor}\nmoves = false\nshape = {plane}\n");
     Rig::new(&scene("", &[floor, body(2, [0.0; 3], shape, "")]))
 }
 
-/// Upright with a regular hexagon of radius 1 m below and above, 1 m high.
+/// An upright prism of height 1 m; its bases are regular hexagons of radius 1 m.
 fn hexagons() -> String {
     let corners = (0..12).map(|k| {
         let angle = f64::from(k % 6) * std::f64::consts::FRAC_PI_3;
@@ -258,7 +258,7 @@ fn contacts_on_a_half_space_are_on_both_and_none_is_deeper_than_the_gap() {
 
 #[test]
 fn bug_a_begin_within_a_tight_budget_showed_contacts_of_a_collision_long_over() {
-    // What holds the budget up is a unit too few for contacts: the witness is asked again, and no more.
+    // The budget is one unit too small for contacts: it covers only a retest of the witness.
     let bodies = [cuboid(1, 0.5), cuboid(2, 0.5)].map(|body| body + "report_within_m = 1.0\n");
     for (away, goes_on) in [(2, true), (50, false)] {
         let mut rig = Rig::new(&scene("", &bodies));
@@ -297,7 +297,7 @@ fn bug_a_begin_within_a_tight_budget_showed_contacts_of_a_collision_long_over() 
     }
 }
 
-/// A solid box of triangles with a side of 1 m, at a place in its body.
+/// A solid mesh cube of side 1 m, at a position in its body.
 fn mesh_at([x, y, z]: [f64; 3]) -> String {
     let corners = (0..8).map(|k| {
         let side = |bit: u32| if k >> bit & 1 == 1 { 0.5 } else { -0.5 };
@@ -364,7 +364,7 @@ fn bug_closest_points_of_compounds_with_meshes_were_missing_or_of_other_shapes()
     }
 }
 
-/// The interval of a contact that was carried along was that of the pose it was taken at.
+/// A contact kept from an earlier pose had the interval of that pose.
 #[test]
 fn bug_contacts_of_an_older_pose_had_intervals_without_the_truth() {
     let mut rig = Rig::new(&scene("", &[cuboid(1, 0.5), cuboid(2, 0.5)]));

@@ -1,5 +1,5 @@
-//! 4.5: a frame's own deadline shortens the time of its tick and never lengthens it; what ends late is flagged and
-//! counted. Each look at the clock takes a microsecond here, so that work takes time.
+//! Law 4.5: a frame's own deadline shortens the time of its tick and never lengthens it; a tick that ends late is
+//! flagged and counted. Each clock read takes a microsecond here, so that work takes time.
 
 use sweepd::time::{Budget, Clock};
 use sweepd::wire::{RejectReason, TickRow, Verdict, frame_flags};
@@ -9,10 +9,10 @@ use crate::rig::{ALL, FRAME_NS, Rig, ball_pairs, put_pairs};
 
 const LOOK_NS: u64 = 1_000;
 const PAIRS: u64 = 400;
-/// Where the second ball of a pair stands, seen from the first: boxes overlap in both places.
+/// Position of the second ball of a pair relative to the first; the boxes overlap at both positions.
 const TOUCHING: [f64; 2] = [1.2, 1.2];
 const APART: [f64; 2] = [1.5, 1.5];
-/// Time for some 250 of the queries, a look each.
+/// Time for about 250 queries, with one clock read each.
 const SHORT_NS: u64 = 300_000;
 const LONG_NS: u64 = 1_000_000_000;
 
@@ -29,7 +29,7 @@ fn put(rig: &mut Rig, place: [f64; 2]) {
     put_pairs(rig, PAIRS, place);
 }
 
-/// All pairs move into one another: each is open again.
+/// Moves all pairs into overlap, so that each is open again.
 fn collide(rig: &mut Rig, budget: Budget) -> TickRow {
     put(rig, TOUCHING);
     rig.clock.step_each_read(LOOK_NS);
@@ -38,7 +38,7 @@ fn collide(rig: &mut Rig, budget: Budget) -> TickRow {
     rig.out.tick
 }
 
-/// Makes a new revision of the scene, if the margin is a new one.
+/// An edit that makes a new scene revision if the margin differs from the current one.
 fn margin(report_within_m: f64) -> Edit {
     Edit::Margin {
         name: None,
@@ -46,12 +46,12 @@ fn margin(report_within_m: f64) -> Edit {
     }
 }
 
-/// So long after the next tick's wake-up, but for some looks at the clock.
+/// A time `ns` after the next tick's wake-up, up to a few clock reads.
 fn after(rig: &Rig, ns: u64) -> u64 {
     rig.clock.monotonic_ns() + FRAME_NS + ns
 }
 
-/// The tick was cut off at about `SHORT_NS`, and in time.
+/// Asserts that the tick was cut off at about `SHORT_NS`, and in time.
 fn assert_short(row: &TickRow) {
     assert!(
         (SHORT_NS - 10 * LOOK_NS..=SHORT_NS).contains(&row.budget_ns),
@@ -87,7 +87,7 @@ fn law_4_5_the_time_that_a_frame_has_left_counts_from_its_receipt() {
 fn law_4_5_bug_what_a_tick_took_before_it_began_was_charged_twice_to_the_time_that_a_frame_has_left()
  {
     let mut rig = pairs();
-    // The frame comes at the wake-up, and 0.2 ms pass before the tick.
+    // The frame arrives at the wake-up, and 0.2 ms pass before the tick.
     (rig.woken_ns, rig.time_left_ns) = (200_000, SHORT_NS + 200_000);
     let row = collide(&mut rig, ALL);
     let budget_ns = row.budget_ns - 200_000;
@@ -115,10 +115,10 @@ fn law_4_5_a_frames_deadline_never_lengthens_the_budget() {
     let mut rig = pairs();
     rig.time_left_ns = LONG_NS;
     let row = collide(&mut rig, budget);
-    // Two looks at the clock tell when the frame came.
+    // Two clock reads determine when the frame arrived.
     assert_eq!(row.budget_ns, SHORT_NS);
     assert!(row.units <= plain.units && row.units + 3 > plain.units);
-    // Nor does it give more work units than are allowed.
+    // A deadline does not raise the limit of work units either.
     let mut rig = pairs();
     rig.deadline_ns = after(&rig, LONG_NS);
     assert_eq!(collide(&mut rig, Budget::units(7)).units, 7);
@@ -141,7 +141,7 @@ fn law_4_5_a_frame_that_waited_for_a_revision_shortens_the_tick_that_it_is_admit
         let row = rig.edit(vec![margin(0.01)], ALL).tick;
         rig.clock.step_each_read(0);
         assert_short(&row);
-        // Once: the next tick is nobody's.
+        // The deadline applies once: no frame limits the next tick.
         let row = rig.idle(FRAME_NS, ALL).tick;
         assert_eq!((row.budget_ns, row.possible), (u64::MAX, 0));
     }
@@ -154,7 +154,7 @@ fn law_4_5_a_frame_that_goes_on_waiting_does_not_shorten_the_tick_of_the_one_bef
     let now = rig.out.tick.header.scene_rev;
     (rig.scene_rev, rig.time_left_ns) = (now + 1, 2 * FRAME_NS + SHORT_NS);
     rig.send(ALL);
-    // The next one, in the tick of the edit that the first waits for, waits for another.
+    // The next frame arrives in the tick of the edit that the first waits for, and waits for a later edit.
     (rig.scene_rev, rig.time_left_ns) = (now + 2, 1);
     rig.clock.step_each_read(LOOK_NS);
     let row = rig.send_with(vec![margin(0.01)], ALL).tick;
@@ -195,7 +195,7 @@ fn law_4_5_a_deadline_that_is_missed_is_told_with_a_budget_and_without_one() {
         rig.deadline_ns = 1;
         let row = collide(&mut rig, budget);
         assert_eq!((row.overrun, row.missed, row.budget_ns), (1, 1, 0));
-        // The tick takes its floor all the same, and no pair is left out.
+        // The tick still does the work of its floor, and no pair is omitted.
         assert_eq!((row.units, row.possible), (0, PAIRS));
         assert_eq!(rig.verdict(1, 2), Verdict::Possible);
         assert_eq!(rig.out.pairs.len() as u64, PAIRS);
@@ -219,7 +219,7 @@ fn law_4_5_below_its_floor_a_tick_takes_the_floor_and_is_flagged_and_above_it_it
         assert_eq!(row.possible, PAIRS, "all of them are told");
         floor_ns = row.floor_ns;
     }
-    // The looks that the narrow phase takes to find that it has no time.
+    // Clock reads that the narrow phase needs to find that it has no time.
     let looks_ns = 10 * LOOK_NS;
     let mut units = 0;
     for above_ns in (looks_ns..SHORT_NS).step_by(7_000) {
@@ -248,7 +248,7 @@ fn law_4_7_where_only_frames_deadlines_end_the_work_each_pair_has_its_turn_too()
     let mut decided: Vec<bool> = (0..PAIRS).map(|_| false).collect();
     let mut least = PAIRS;
     for tick in 0..120 {
-        // Elsewhere each time: what was proved where they were before says nothing.
+        // Positions change each tick, so that no earlier proof is valid.
         let [x, y] = if tick % 2 == 0 { TOUCHING } else { APART };
         let side = |turn: i32| if tick / turn % 2 == 0 { 1.0 } else { -1.0 };
         let aside = 0.25 * side(2);

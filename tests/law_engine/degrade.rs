@@ -1,4 +1,4 @@
-//! 4.7: what is left out first when the budget does not reach for all: contacts, then bounds.
+//! Law 4.7: the order in which work is omitted if the budget does not suffice: contacts first, then bounds.
 
 use std::collections::BTreeSet;
 
@@ -9,13 +9,13 @@ use sweepd::wire::{Level, PairRow, Verdict, contact_flags};
 use crate::oracle::meshes::{bumpy_sphere, trimesh};
 use crate::rig::{ALL, Rig, body, scene};
 
-/// Pairs far from one another, every second in contact, the others near.
+/// Pairs far from each other, alternately in contact and near.
 const PAIRS: usize = 24;
 
 fn place(rig: &mut Rig, tick: u32) {
     for pair in 0..PAIRS {
         let distance_m = if pair % 2 == 0 { 1.9 } else { 2.2 };
-        // Round and round by less than would leave a verdict open.
+        // The second balls move on circles by too little to make a verdict open.
         let (s, c) = (0.7 + 0.005 * f64::from(tick)).sin_cos();
         rig.row(2 * pair as u64 + 2).position =
             [20.0 * pair as f64 + distance_m * c, distance_m * s, 0.0];
@@ -39,7 +39,7 @@ fn is_fresh(row: &PairRow) -> bool {
     row.bound_age_ticks == 0 && row.level == Level::Exact.code()
 }
 
-/// Of the last tick: pairs whose bound is of its poses, and of those that collide the ones whose contacts are.
+/// In the last tick: the pairs with bounds at its poses, and the colliding pairs with contacts at its poses.
 fn fresh(rig: &Rig) -> (BTreeSet<u64>, BTreeSet<u64>) {
     let rows = &rig.out.pairs;
     assert_eq!(rows.len(), PAIRS, "each pair is told of");
@@ -73,12 +73,12 @@ fn law_4_7_contacts_have_what_bounds_leave_and_bounds_what_verdicts_leave() {
             assert!(contacts.is_empty() || near_bounds == near, "{told}");
             let whole = usize::try_from(units).unwrap();
             if nth > 0 && whole < PAIRS {
-                // Too few for all bounds, and that is known by now.
+                // Too few units for all bounds; the narrow phase has learned this by now.
                 assert!(contacts.is_empty(), "{told}");
                 assert_eq!(bounds.len(), whole, "{told}");
             }
             if nth > 1 && whole >= PAIRS {
-                // One query says both of a pair that collides.
+                // For a colliding pair one query yields both.
                 assert_eq!((bounds.len(), contacts.len()), (PAIRS, near), "{told}");
             }
         }

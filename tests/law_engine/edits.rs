@@ -1,4 +1,4 @@
-//! 3.1 generations, 3.10 filters and attached bodies.
+//! Laws 3.1, generations, and 3.10, filters and attached bodies.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -130,7 +130,7 @@ fn law_3_10_an_attached_body_moves_and_is_lost_with_its_parent() {
     rig.rows.retain(|row| row.body != 2);
     rig.send(ALL);
     assert_eq!(rig.state(), State::Clear);
-    // The parent drives the child into the third body.
+    // The parent moves its child into the third body.
     rig.row(1).position = [100.0, -4.0, 0.0];
     rig.send(ALL);
     assert_eq!(rig.verdict(2, 3), Verdict::Colliding);
@@ -158,7 +158,7 @@ fn law_4_7_contacts_are_computed_only_for_listeners_and_owed_to_those_who_come_l
     rig.send(ALL);
     assert_eq!(rig.engine.counters().manifolds, 0);
     assert_eq!((rig.out.contacts.len(), rig.out.regions.len()), (0, 0));
-    // Regions are made of them, whoever reads these.
+    // Regions are computed from contacts, so that contacts are found even if only regions are in demand.
     rig.demand.regions = true;
     rig.idle(FRAME_NS, ALL);
     assert_eq!(
@@ -216,14 +216,14 @@ fn margin(name: Option<&str>, report_within_m: Option<f64>) -> Edit {
     }
 }
 
-/// The verdict on two bodies that have a row, or may have none where they are farther apart than anybody asks for.
+/// The verdict of bodies 1 and 2, or `None`: no row, since they are farther apart than any margin.
 fn told(rig: &Rig) -> Option<Verdict> {
     rig.pair(1, 2).map(|_| rig.verdict(1, 2))
 }
 
 #[test]
 fn law_3_3_a_margin_set_at_run_time_is_that_of_a_body_put_with_it() {
-    // A gap of 0.5 m, in a world of two and in one whose broad phase keeps structures.
+    // A gap of 0.5 m, in a world of two bodies and in one large enough for a broad phase with structures.
     for crowd in [0, 60] {
         let mut bodies = vec![ball(1, 0.0, ""), ball(2, 2.5, "report_within_m = 0.1\n")];
         bodies.extend((3..3 + crowd).map(|id| ball(id, 10.0 * id as f64, "")));
@@ -232,7 +232,7 @@ fn law_3_3_a_margin_set_at_run_time_is_that_of_a_body_put_with_it() {
         assert_eq!(told(&rig), None);
         rig.edit(vec![margin(Some("b1"), Some(0.6))], ALL);
         assert_eq!(told(&rig), Some(Verdict::Near));
-        // At rest, too: no pose is needed for what the edit says.
+        // This also holds at rest: an edit takes effect without a new pose.
         let frames: [(Edit, Option<Verdict>); 5] = [
             (margin(Some("b1"), Some(0.4)), None),
             (margin(None, Some(0.7)), Some(Verdict::Near)),
@@ -260,7 +260,7 @@ fn fixed(id: u64, at: [f64; 3], shape: &str, more: &str) -> String {
 const BASE: &str = "{ type = \"box\", half_extents = [0.5, 0.5, 0.5] }";
 const FLOOR: &str = "{ type = \"half_space\", normal = [0, 0, 1], offset = 0.0 }";
 
-/// Its certificates count its motion as none: it cannot move.
+/// Its certificates assumed that it never moves.
 #[test]
 fn bug_a_half_space_that_an_edit_moves_is_asked_anew() {
     let floor = fixed(3, [-50.0, 0.0, 0.0], FLOOR, "attached_to = \"b2\"");
@@ -288,7 +288,7 @@ fn bug_a_half_space_that_an_edit_moves_is_asked_anew() {
     }
 }
 
-/// While it hung on a body that moves, no length told how far it had moved.
+/// While it was attached to a moving body, no length bounded its motion.
 #[test]
 fn bug_a_half_space_that_was_let_go_has_no_certificate_from_when_it_moved() {
     let floor = fixed(3, [-50.0, 0.0, 0.0], FLOOR, "attached_to = \"b2\"");
@@ -312,7 +312,8 @@ fn bug_a_half_space_that_was_let_go_has_no_certificate_from_when_it_moved() {
     assert_eq!(rig.verdict(1, 3), Verdict::Colliding, "by 0.1 m");
 }
 
-/// Few boxes are compared pair by pair; that stays while there are a few more, and comes back where there are few again.
+/// A few boxes are compared pair by pair. The plan keeps this for slightly more bodies, and returns to it once there
+/// are few again.
 #[test]
 fn the_plan_follows_the_scene_and_says_so_in_the_tick_of_the_edit() {
     let bodies: Vec<String> = (1..=33).map(|id| ball(id, 10.0 * id as f64, "")).collect();
@@ -334,17 +335,17 @@ fn the_plan_follows_the_scene_and_says_so_in_the_tick_of_the_edit() {
     };
     rig.edit((25..=33).map(remove).collect(), ALL);
     assert_eq!(method(&rig), (true, Some(24)));
-    // Whatever was chosen meanwhile, pairs are found.
+    // Pairs are found after each change of the method.
     rig.move_x(2, 11.0);
     rig.send(ALL);
     assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
 }
 
-/// The tick in which the plan takes another broad phase is an edit's: what that edit ends, begins and replaces is told
-/// as in any other tick.
+/// The plan changes the broad phase in the tick of an edit; the ends, begins and replacements of that edit must be
+/// published as in any other tick.
 #[test]
 fn bug_the_tick_in_which_the_broad_phase_changed_forgot_what_else_had_changed() {
-    // All touch their neighbours; the last but one is kept from its neighbours later.
+    // Each ball overlaps its neighbours.
     let bodies: Vec<String> = (1..=40).map(|id| ball(id, 1.5 * id as f64, "")).collect();
     let remove = |id: usize| Edit::Remove {
         name: format!("b{id}"),
@@ -354,7 +355,7 @@ fn bug_the_tick_in_which_the_broad_phase_changed_forgot_what_else_had_changed() 
         name: "b6".to_owned(),
         enabled: false,
     };
-    // In place of a ball that touched nobody's middle: one that holds the next one's.
+    // Replaces ball 9 by a larger one, which also reaches ball 11.
     let larger = ball(9, 13.5, "").replace("radius = 1.0", "radius = 2.9");
     for method in ["auto", "order", "brute"] {
         let head = format!("[run]\nbroad_phase = \"{method}\"\n");
@@ -381,7 +382,7 @@ fn bug_the_tick_in_which_the_broad_phase_changed_forgot_what_else_had_changed() 
             Verdict::Colliding,
             "{method}: as it is now"
         );
-        // And back: as many as the method takes, and one that goes.
+        // Back to the other method: enough bodies for it, and one removal.
         let grow: Vec<Edit> = (26..=40).map(|n| put(&bodies[..n])).collect();
         rig.edit(grow.into_iter().chain([remove(1)]).collect(), ALL);
         assert_eq!(end(&rig, 1, 2), ended(EndCause::Removed), "{method}");

@@ -1,4 +1,4 @@
-//! 3.5 events.
+//! Law 3.5: events.
 
 use sweepd::scene::PairAction;
 use sweepd::wire::{EndCause, Event, Verdict, pair_flags};
@@ -6,7 +6,7 @@ use sweepd::world::Edit;
 
 use crate::rig::{ALL, FRAME_NS, NONE, Rig, ball, has, rule, scene};
 
-/// Two balls, ids 1 and 2, at distance 2.5 m: apart, and their boxes too.
+/// Two balls, ids 1 and 2, with centres 2.5 m apart: neither the balls nor their boxes overlap.
 fn two() -> Rig {
     Rig::new(&scene("", &[ball(1, 0.0, ""), ball(2, 2.5, "")]))
 }
@@ -89,7 +89,7 @@ fn law_3_5_an_end_by_cause_is_sent_at_once_also_from_possible() {
         rig.move_x(2, 1.9);
         rig.send(ALL);
         assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
-        // Apart, but the boxes overlap and there is nothing to spend.
+        // The balls are apart, but their boxes overlap and the budget is zero.
         rig.row(2).position = [1.5, 1.5, 0.0];
         rig.send(NONE);
         assert_eq!(rig.verdict(1, 2), Verdict::Possible, "{cause}");

@@ -1,5 +1,5 @@
-//! Shapes far from their body's origin or told by large numbers, and large beside small: what rounding hides passes for
-//! no touch, and what is large takes nothing from what is small.
+//! Shapes far from their body's origin or with large coordinates, and large next to small ones: an overlap within
+//! rounding errors is not proved apart or certain, and a large shape does not reduce the accuracy of a small one.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -9,7 +9,7 @@ use sweepd::wire::{ContactKind, ContactRow, Demand, Verdict, pair_flags};
 use crate::oracle::meshes::{Soup, cuboid, torus, trimesh};
 use crate::rig::{ALL, Rig, body, scene};
 
-/// A mesh as a shape of a scene file at a place.
+/// A mesh as the shape of a scene file, at a position.
 fn mesh_at(soup: &Soup, solid: bool, at: [f64; 3]) -> String {
     let shape = trimesh(soup, Some(solid));
     let open = shape.trim_end_matches('}');
@@ -27,15 +27,15 @@ fn octahedron() -> Soup {
     Soup::new(ends.collect(), faces)
 }
 
-/// Nobody asks for bounds: a verdict is all that is worked for.
+/// Without demand for bounds only verdicts are worked on.
 fn without_bounds(bodies: &[String]) -> Rig {
     let mut rig = Rig::new(&scene("", bodies));
     rig.demand = Demand::default();
     rig
 }
 
-/// The walk ended at the box of the whole, as soon as that was over the plane by more than rounding, with an upper end
-/// of a metre; wider by what composing the poses lost it held 0, and passed for a touch.
+/// The walk ended at the root box as soon as its distance from the plane exceeded rounding errors, with an upper end of
+/// a metre. Widened by the rounding error of the composed poses, the interval contained 0 and counted as a contact.
 #[test]
 fn bug_a_mesh_over_a_half_space_touched_it_where_its_box_all_but_did() {
     let octahedron = mesh_at(&octahedron(), true, [0.5, 0.0, 0.0]);
@@ -45,7 +45,8 @@ fn bug_a_mesh_over_a_half_space_touched_it_where_its_box_all_but_did() {
     let middle = turn * Vec3::new(0.5, 0.0, 0.0);
     for shape in [octahedron.clone(), format!("[{octahedron}, {beside}]")] {
         for step in -4..400 {
-            // From where its box is on the plane, less and more what that is rounded by.
+            // Heights around that at which its box rests on the plane, from below to above it by more than the rounding
+            // error.
             let height = 3.0_f64.sqrt() + f64::from(step) * 1.5e-9;
             let at = Vec3::new(1e6, 0.0, height) - middle;
             let mut rig = without_bounds(&[body(1, [0.0; 3], &shape, ""), floor.to_owned()]);
@@ -56,7 +57,7 @@ fn bug_a_mesh_over_a_half_space_touched_it_where_its_box_all_but_did() {
     }
 }
 
-/// The same of two surfaces that no plane parts: their front ended at the first proof that they are apart.
+/// The same for two surfaces that no plane separates: their front ended at the first proof that they are apart.
 #[test]
 fn bug_a_rod_in_a_ring_touched_it_where_boxes_all_but_did() {
     const FAR: f64 = 1e12;
@@ -76,8 +77,8 @@ fn bug_a_rod_in_a_ring_touched_it_where_boxes_all_but_did() {
     }
 }
 
-/// What touched before was asked again as if the place of a shape a million kilometres from its body's origin were
-/// known to the last digit.
+/// The retest of a previous contact assumed that the position of a shape a million kilometres from its body's origin
+/// was exact.
 #[test]
 fn bug_a_touch_that_goes_on_was_certain_where_rounding_hides_it() {
     const FAR: f64 = 1e9;
@@ -104,7 +105,7 @@ fn bug_a_touch_that_goes_on_was_certain_where_rounding_hides_it() {
             let row = rig.pair(1, 2).unwrap();
             assert_eq!(row.verdict, Verdict::Colliding.code());
             assert_eq!(row.flags & pair_flags::TOUCHING, pair_flags::TOUCHING);
-            // 1e-6 m is less than two numbers of 1e9 m can tell, turned by 1 rad.
+            // 1e-6 m is less than the spacing of numbers near 1e9 m after a rotation by 1 rad.
             assert!(row.gap_max_m > 1e-6, "tick {tick}: {row:?}");
         }
     }
@@ -121,7 +122,7 @@ fn convex(soup: &Soup) -> String {
     format!("{{ type = \"convex\", vertices = {vertices:?} }}")
 }
 
-/// A cube on something, and the pose of what it lies on and of itself.
+/// A cube on a support: name, the two shapes, and the positions of support and cube.
 fn cubes_at_rest() -> Vec<(&'static str, [String; 2], [Vec3; 2])> {
     const UTM: Vec3 = Vec3::new(4.5e5, 5e6, 0.0);
     let cube = |half: f64| format!("{{ type = \"box\", half_extents = [{half}, {half}, {half}] }}");
@@ -181,7 +182,7 @@ fn bug_contact_points_were_one_where_the_larger_shape_or_its_numbers_were_large(
     }
 }
 
-/// How near the ends of a depth were brought to each other hung on how far from its origin a hull was told.
+/// The accuracy of the interval of the depth depended on the distance of the hull from its origin.
 #[test]
 fn bug_the_depth_of_a_small_cylinder_in_a_hull_far_from_its_origin_was_a_guess() {
     const UTM: Vec3 = Vec3::new(4.5e5, 5e6, 0.0);

@@ -1,5 +1,5 @@
-//! Law 4.7 for meshes on half-spaces: verdicts before contacts, last touches before all, and no pair waits for ever,
-//! whatever moves from tick to tick.
+//! Law 4.7 for meshes on half-spaces: verdicts before contacts, pairs in contact before others, and no pair waits for
+//! ever, whatever moves from tick to tick.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use sweepd::wire::{Verdict, VertexFrame, VertexHeader, WIRE_VERSION, name_bytes,
 
 use crate::rig::{ALL, Rig, body, scene};
 
-/// Quads along a side of the cloth.
+/// Quads along one side of the cloth.
 const SIDE: usize = 60;
 const FLOOR: &str = "{ type = \"half_space\", normal = [0.0, 0.0, 1.0] }";
 const RAMPS: &str = "[{ type = \"half_space\", normal = [0.0, 0.0, 1.0] }, \
@@ -22,12 +22,12 @@ fn units(units: u64) -> Budget {
     }
 }
 
-/// A sheet of `2 side^2` triangles and of 1 m.
+/// A sheet of `2 side^2` triangles and side 1 m.
 fn sheet(side: usize) -> String {
     bowl(side, 0.0)
 }
 
-/// The same, bent up from its middle.
+/// The same sheet, curved upwards from its centre.
 fn bowl(side: usize, up: f64) -> String {
     let mut text = "{ type = \"trimesh\", solid = false, vertices = [".to_owned();
     for at in 0..(side + 1) * (side + 1) {
@@ -47,7 +47,7 @@ fn floor(id: u64, shape: &str) -> String {
     format!("name = \"b{id}\"\nid = {id}\nmoves = false\nshape = {shape}\n")
 }
 
-/// The cloth as a wave runs through it that is somewhere 0.2 mm and more under its own plane.
+/// The vertices of the cloth with a travelling wave of amplitude 0.15 mm.
 fn waved(tick: u64) -> VertexFrame {
     let row = |at: usize| {
         let [x, y] = [at % (SIDE + 1), at / (SIDE + 1)];
@@ -79,7 +79,7 @@ fn waved(tick: u64) -> VertexFrame {
     }
 }
 
-/// Of 40 ticks with 5,000 units: in how many the cloth is told to collide, and in how many with contacts that are new.
+/// Of 40 ticks with 5,000 units: the number with the cloth reported as colliding, and the number with new contacts.
 fn told(on: &str, bends: bool) -> [u32; 2] {
     let at = [0.0, 0.0, -2e-4];
     let more = if bends { "deforms = true\n" } else { "" };
@@ -121,7 +121,7 @@ fn law_4_7_bug_the_verdict_of_a_cloth_on_a_floor_waits_for_no_contacts_of_an_old
     );
 }
 
-/// The cloth touches, is near, touches for too short a time for its contacts to be found, is near, and touches again.
+/// The cloth touches, is near, touches for too short a time to find its contacts, is near, and touches again.
 #[test]
 fn bug_contacts_of_a_collision_that_was_over_were_told_in_the_next_one() {
     let cloth = body(1, [0.0; 3], &sheet(SIDE), "report_within_m = 0.05\n");
@@ -173,7 +173,7 @@ fn contacts_on_a_floor_are_those_of_the_tick_where_the_budget_reaches() {
     }
 }
 
-/// Sheets in the floor that are moved, and so many units that each has one.
+/// Moving sheets that penetrate the floor, with one unit for each.
 #[test]
 fn law_4_7_bug_a_touch_on_a_floor_is_confirmed_by_one_unit() {
     const SHEETS: u64 = 8;
@@ -186,7 +186,8 @@ fn law_4_7_bug_a_touch_on_a_floor_is_confirmed_by_one_unit() {
     rig.send(ALL);
     for tick in 0..20_i32 {
         for id in 1..=SHEETS {
-            // Deeper than the sheets move, but not by what was proved of any tick but the last.
+            // Deeper than the sheets move in a tick, but less deep than two ticks of motion: only proofs of the last
+            // tick help.
             let z = -0.01 - 0.02 * f64::from(tick % 2);
             let x = 3.0 * id as f64 + 0.05 * f64::from(tick);
             rig.place(id, &Pose::translation(x, 0.0, z));
@@ -197,7 +198,7 @@ fn law_4_7_bug_a_touch_on_a_floor_is_confirmed_by_one_unit() {
     }
 }
 
-/// Bowls that have just come out of the floor: their witnesses say no more, and there is a unit for each.
+/// Bowls that have just left the floor: their witnesses prove nothing any more, and there is one unit for each.
 #[test]
 fn law_4_7_bug_pairs_that_part_do_not_spend_all_units_on_their_last_touch() {
     const BOWLS: u64 = 8;
@@ -213,7 +214,7 @@ fn law_4_7_bug_pairs_that_part_do_not_spend_all_units_on_their_last_touch() {
         let mut last = 0;
         for tick in 0..400_i32 {
             for id in 1..=BOWLS {
-                // They tremble, each about its place.
+                // Each bowl oscillates about its position.
                 let z = 0.01 + 0.001 * f64::from(tick % 2);
                 rig.place(id, &Pose::translation(x(id), 0.0, z));
             }
@@ -238,7 +239,7 @@ fn law_4_6_bug_a_mesh_that_moves_over_a_floor_with_ramps_is_decided_in_parts() {
     let mut decided = 0;
     for tick in 0..60_i32 {
         let x = 1e-5 * f64::from(tick);
-        // Tilted: its boxes reach farther down than it does, by about a centimetre.
+        // Tilted, its boxes reach about a centimetre lower than the surface.
         let tilt = Quat::from_axis_angle(&Vec3::x_axis(), 0.2);
         let at = Vec3::new(x, 0.0, 0.0111);
         rig.place(1, &Pose::from_parts(at.into(), tilt));
@@ -248,8 +249,8 @@ fn law_4_6_bug_a_mesh_that_moves_over_a_floor_with_ramps_is_decided_in_parts() {
     assert!(decided >= 40, "{decided} of 60");
 }
 
-/// Tilted bowls just over the floor that turn by more in a tick than any walk of an older pose can tell, and units for
-/// fewer than two walks a tick.
+/// Tilted bowls just above the floor that turn farther in a tick than any walk of an earlier pose allows, with units
+/// for fewer than two walks per tick.
 #[test]
 fn law_4_7_bug_turns_on_half_spaces_did_not_grow_while_a_pair_waits() {
     const BOWLS: u64 = 8;

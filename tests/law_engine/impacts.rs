@@ -1,4 +1,5 @@
-//! When two bodies touch first on a way that a question says: closed forms, samples of the way, cut off at any unit.
+//! Questions for the first contact of two bodies on a given motion: closed forms, samples of the motion, work cut off
+//! after any unit.
 
 mod attached;
 mod bugs;
@@ -81,7 +82,7 @@ fn straight_ways_and_turns_end_where_formulas_say() {
         (late.verdict, late.t_min_s, late.t_max_s),
         (Verdict::Apart.code(), 2.9, None)
     );
-    // Past each other by more than both radii; and by less, askew.
+    // First past each other by more than both radii, then by less, off-centre.
     let past = ask(
         world,
         r#"{"a": "b1", "b": "b2", "linear_a": [1, 0.5, 0], "within_s": 99}"#,
@@ -93,7 +94,7 @@ fn straight_ways_and_turns_end_where_formulas_say() {
     );
     let (speed2, along) = (1.09, 5.0);
     at(&askew, (along - (25.0_f64 - speed2 * 21.0).sqrt()) / speed2);
-    // A rod that turns into a ball beside its middle.
+    // A rod that turns into a ball next to its middle.
     let turning = rig(&[
         body(1, [0.0; 3], ROD, ""),
         body(
@@ -111,7 +112,7 @@ fn straight_ways_and_turns_end_where_formulas_say() {
         &found,
         (std::f64::consts::FRAC_PI_2 - (0.3_f64 / 0.8).asin()) / 2.0,
     );
-    // The centre of what turns about a joint goes straight on.
+    // The body turns about a joint; its centre moves in a straight line.
     let arm = "{ type = \"sphere\", radius = 0.5, position = [1, 0, 0] }";
     let joint = rig(&[
         body(1, [0.0; 3], arm, ""),
@@ -129,7 +130,7 @@ fn straight_ways_and_turns_end_where_formulas_say() {
         ),
         2.0,
     );
-    // Down to a floor; and at once, where they touch already.
+    // A ball falls to a floor; two balls that already touch have time 0.
     let floor = "name = \"floor\"\nid = 9\nmoves = false\nshape = { type = \"half_space\", normal = [0, 0, 1], offset = -5 }\n";
     let falling = rig(&[floor.to_owned(), ball(1, 0.0, ""), ball(2, 1.5, "")]);
     let world = falling.engine.world();
@@ -143,7 +144,7 @@ fn straight_ways_and_turns_end_where_formulas_say() {
     at(&ask(world, r#"{"a": "b1", "b": "b2"}"#), 0.0);
 }
 
-/// A wheel that turned beside a plate came to nothing but `possible`: each turn counted as a way of its surface.
+/// A wheel turning next to a plate only got the verdict `possible`: its rotation counted as motion of its surface.
 #[test]
 fn bug_what_spins_about_its_own_axis_goes_nowhere() {
     let shapes = [
@@ -168,7 +169,7 @@ fn bug_what_spins_about_its_own_axis_goes_nowhere() {
         r#"{"a": "b1", "b": "b2", "linear_a": [0.5, 0, 0], "angular_a": [0, 0, 50], "within_s": 10}"#,
     );
     at(&found, 2.0);
-    // About any other axis it does.
+    // Rotation about any other axis does move the surface.
     let above = "{ type = \"box\", half_extents = [1, 1, 0.1] }";
     let above = body(2, [0.0, 0.0, 0.5], above, "");
     let near = rig(&[body(1, [0.0; 3], shapes[0], ""), above]);
@@ -206,7 +207,7 @@ fn velocities_are_those_that_were_sent_where_none_are_said() {
     assert_eq!(other.angular_a, [0.0; 3]);
 }
 
-/// Least and greatest gap at a share of the way.
+/// Lower and upper end of the gap at a share of the motion.
 fn gap_at((a, b): (&Body, &Body), share: f64) -> (f64, f64) {
     let there = |body: &Body| {
         let path = body.path.as_deref().unwrap();
@@ -312,7 +313,8 @@ fn what_cannot_be_followed_is_answered_with_what_to_change() {
     }
 }
 
-/// A thousand kilometres out a way is known to some nanometres, which here take thousandths of a second.
+/// A thousand kilometres from the origin a motion is known to a few nanometres, which correspond to milliseconds at
+/// this speed.
 #[test]
 fn bug_a_touch_that_rounding_alone_tells_is_no_time_of_impact() {
     let shape = "{ type = \"sphere\", radius = 0.5 }";
@@ -342,7 +344,7 @@ fn bug_a_touch_that_rounding_alone_tells_is_no_time_of_impact() {
             assert!(within_s < 1.01, "{found:?}");
         }
     }
-    // It comes as near as rounding, and never touches.
+    // The bodies approach to within rounding errors and never touch.
     let rig = rig(&bodies(far));
     let json = r#"{"a": "b1", "b": "b2", "linear_a": [9.99e-7, 0, 0], "within_s": 1}"#;
     let found = ask(rig.engine.world(), json);

@@ -1,10 +1,10 @@
-//! 3.9 truncation.
+//! Law 3.9: truncation.
 
 use sweepd::wire::{BodyStatus, Event, Reason, State, Verdict};
 
 use crate::rig::{ALL, FRAME_NS, NONE, Rig, ball, body, has, scene};
 
-/// `n` couples of balls, ids 2k and 2k + 1, the k-th `gap(k)` metres apart; 100 m between couples.
+/// `n` couples of balls, ids 2k and 2k + 1, with gap `gap(k)` in metres; 100 m from couple to couple.
 fn couples(head: &str, n: u64, gap: impl Fn(u64) -> f64, more: &str) -> Rig {
     let mut bodies = Vec::new();
     for k in 1..=n {
@@ -29,7 +29,7 @@ fn law_3_9_events_that_do_not_fit_wait_with_their_range_and_deeper_pairs_go_firs
     assert_eq!(rig.state(), State::Colliding);
     assert!(rig.because(Reason::Truncated));
     rig.send(ALL);
-    // The two that waited come first, with the tick in which they began, then the deepest.
+    // The two delayed rows come first, with the tick of their begin, then the deepest pair.
     assert_eq!(ids(&rig), [1, 2, 5]);
     for row in &rig.out.pairs[..2] {
         assert!(has(row, Event::Begin));
@@ -68,7 +68,7 @@ fn law_3_9_rows_left_out_of_changes_are_those_of_pairs_and_their_events_wait_too
         let rows = rig.out.changes.iter();
         ended += rows.filter(|row| has(row, Event::End)).count();
     }
-    // All of it fits again, and the next says what is new in it: the last of the ended has left.
+    // All rows fit again. The next message has only changes: the last ended pair has left the list.
     assert_eq!(rig.out.changes_header.message.truncated, 0);
     rig.send(ALL);
     let header = rig.out.changes_header;
@@ -91,11 +91,11 @@ fn law_3_9_an_event_waits_after_its_pair_is_gone_and_begin_and_end_unsent_cancel
         rig.row(2 * k).position[1] = 50.0;
     }
     rig.send(ALL);
-    // Begins of 1 and 2 were never sent, and now they have ended.
+    // The begins of 1 and 2 were never sent, and now these pairs have ended.
     assert_eq!(rig.out.tick.cancelled_events, 2);
     assert_eq!(ids(&rig), [3]);
     assert!(has(&rig.out.pairs[0], Event::End));
-    // An end that waits: 3 collides and is told, then all three end at once.
+    // A delayed end: 3 collides and is published, then all three end at once.
     let mut rig = couples(head, 3, |k| -0.1 * k as f64, "");
     for _ in 0..4 {
         rig.send(ALL);
@@ -128,7 +128,7 @@ fn law_3_9_bug_an_event_that_waits_has_its_turn_before_deeper_ones_that_are_new(
     assert_eq!(ids(&rig), [1]);
     rig.send(ALL);
     assert_eq!(ids(&rig), [2]);
-    // Both end; then the first goes in and out, deeper than the second ever was.
+    // Both end; then the first pair begins and ends repeatedly, deeper than the second ever was.
     rig.row(4).position[1] = 50.0;
     let mut told = Vec::new();
     for tick in 0..8 {
@@ -151,7 +151,7 @@ fn law_3_9_rows_keep_their_rank_colliding_before_possible_before_near() {
         );
         rig.send(ALL);
         rig.send(ALL);
-        // The second couple moves and nothing is left to look at it: possible.
+        // The second couple moves, and the budget is zero: its verdict is possible.
         rig.row(4).position[2] = 0.4;
         rig.send(NONE);
         assert_eq!(rig.verdict(2, 3), Verdict::Colliding);
@@ -180,7 +180,7 @@ fn rows_that_are_left_where_they_stood_among_others_that_do_not_fit_are_those_of
     let gap = |k: u64| 0.04 * k as f64 - 0.5;
     let mut whole = couples("", 20, gap, near);
     let mut cut = couples("[limits]\npair_rows = 7", 20, gap, near);
-    // Couples that change their gap in a tick, of which those are seven at the most that matter.
+    // Couples that change their gap in a tick; never more than seven rows matter.
     let stirs: [&[u64]; 9] = [&[], &[], &[3], &[20, 19], &[], &[1, 2, 3], &[8], &[], &[7]];
     let mut kept = 0;
     for (tick, stirred) in (0..90).zip(stirs.iter().cycle()) {
@@ -197,9 +197,9 @@ fn rows_that_are_left_where_they_stood_among_others_that_do_not_fit_are_those_of
         for row in &cut.out.pairs {
             let twin = |other: &&sweepd::wire::PairRow| other.body_a == row.body_a;
             let twin = whole.out.pairs.iter().find(twin).unwrap();
-            // Of events that waited the twin has told.
+            // Rows with delayed events are skipped: the twin has published these earlier.
             if row.events & !Event::Persist.bit() == 0 && twin.events == row.events {
-                // In words, for what is not known is NaN.
+                // Compared as text, so that NaN equals NaN.
                 assert_eq!(format!("{row:?}"), format!("{twin:?}"), "tick {tick}");
             }
         }
@@ -247,7 +247,7 @@ fn law_3_9_regions_that_do_not_fit_are_those_of_whole_pairs_the_shallowest() {
 fn law_3_9_beyond_the_pair_set_the_state_is_unknown_and_so_is_each_body_concerned() {
     let mut rig = couples("[limits]\npairs = 2", 4, |_| 0.1, "report_within_m = 0.05");
     for k in 1..=4 {
-        // Boxes overlap, balls do not.
+        // The boxes overlap, the balls do not.
         rig.row(2 * k + 1).position = [100.0 * k as f64 + 1.5, 1.5, 1.5];
     }
     rig.send(ALL);
@@ -269,7 +269,7 @@ fn law_3_9_beyond_the_pair_set_the_state_is_unknown_and_so_is_each_body_concerne
             .count(),
         4
     );
-    // One couple parts: there is room, and the state heals as far as it can; then the rest.
+    // Two couples separate: the other two fit in the pair set, and the state is clear after the next tick.
     for k in 1..=2 {
         rig.row(2 * k).position[1] = -50.0;
     }
@@ -320,7 +320,7 @@ fn bug_an_end_that_waited_carries_the_interval_of_this_tick_not_of_its_last_test
     for _ in 0..3 {
         rig.send(ALL);
     }
-    // Apart on the diagonal, where the boxes overlap: both stay candidates, with certificates of 0.26 m.
+    // Apart along a diagonal, where the boxes overlap: both couples stay candidates, with certificates of 0.26 m.
     let place = |rig: &mut Rig, d: f64| {
         for k in 1..=2 {
             let x = 100.0 * k as f64;
@@ -337,7 +337,7 @@ fn bug_an_end_that_waited_carries_the_interval_of_this_tick_not_of_its_last_test
     };
     place(&mut rig, 1.6);
     assert_eq!(ids(&rig), [1]);
-    // Moved by less than the certificate: nothing is asked, and the row that waited is sent.
+    // They move by less than the certificate: there are no queries, and the delayed row is sent.
     place(&mut rig, 1.55);
     assert_eq!(ids(&rig), [2]);
     assert_eq!(rig.engine.counters().queries, 0);

@@ -1,5 +1,5 @@
-//! Goal: the law of meaning and time, rule by rule, as the whole engine obeys it. Method: small scenes whose truth is
-//! known by hand, and for each rule the counter-example that once spoke against it.
+//! Goal: each rule on the meaning and time of results, tested on the whole engine. Method: small scenes whose truth is
+//! known by hand, and for each rule the counter-example that once violated it.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,

@@ -1,4 +1,4 @@
-//! 4.6 motion bound, 4.7 order of work: what costs nothing, and what carries over.
+//! Laws 4.6, motion bound, and 4.7, order of work: what costs nothing, and what is carried over.
 
 use sweepd::math::{Pose, Quat, Vec3};
 use sweepd::time::Budget;
@@ -10,7 +10,7 @@ use crate::rig::{ALL, FRAME_NS, NONE, Rig, body, scene};
 
 const BALL: &str = "{ type = \"sphere\", radius = 1.0 }";
 
-/// Two balls whose boxes overlap, `gap` metres apart.
+/// Two balls with overlapping boxes and a gap of `gap` metres.
 fn diagonal(gap: f64) -> Rig {
     let place = (2.0 + gap) / 3.0_f64.sqrt();
     let mut bodies = vec![body(1, [0.0; 3], BALL, ""), body(2, [place; 3], BALL, "")];
@@ -115,7 +115,7 @@ fn law_4_6_a_tick_visits_the_pairs_of_what_moved_and_no_others() {
     );
 }
 
-/// Two linked rings of meshes: bounds decide nothing early. Centres `distance` metres apart along x.
+/// Two linked rings as meshes, with centres `distance` metres apart along x: bounds decide no verdict early.
 fn links(distance: f64) -> Rig {
     let shape = trimesh(&meshes::torus(1.0, 0.3, 24, 16), None);
     let bodies = [body(1, [0.0; 3], &shape, ""), body(2, [0.0; 3], &shape, "")];
@@ -141,7 +141,7 @@ fn law_4_7_interrupted_work_is_resumed_so_that_a_vibrating_mesh_pair_is_decided_
             let mut rig = links(distance);
             rig.demand.contacts = false;
             let mut rng = Rng::new(budget);
-            // The interval found at the first pose has to outlast the vibration; three times the work is room enough.
+            // The interval found at the first pose must stay valid during the vibration; three times the work suffices.
             let bound = 3 * whole.div_ceil(budget) + 3;
             let mut ticks = 0;
             loop {

@@ -1,4 +1,4 @@
-//! 3.11 and 4.5: the same inputs give the same bits, in whatever order they come, also when work is cut off.
+//! Laws 3.11 and 4.5: the same inputs give the same bits, whatever their order, even if work is cut off.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use crate::oracle::meshes;
 use crate::oracle::rng::Rng;
 use crate::rig::{Rig, row};
 
-/// A pool of convex bodies and some meshes, each with its own id.
+/// A pool of convex bodies and some meshes, with ids in descending order.
 fn mixed() -> Scene {
     let mut scene = Scene::parse(&pool(60, 4), "scene.toml", Path::new(".")).unwrap();
     let torus = meshes::torus(0.4, 0.15, 10, 7);
@@ -77,7 +77,7 @@ fn law_4_5_the_same_inputs_in_any_order_and_any_broad_phase_give_the_same_bits_a
                 }
                 rig.send(Budget::units(units));
                 let out = &mut rig.out;
-                // How a broad phase works is its own.
+                // The work counters of the broad phase may depend on the order.
                 (
                     out.tick.broad_renewed,
                     out.tick.broad_mode,

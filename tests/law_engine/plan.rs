@@ -1,9 +1,9 @@
-//! 8: what a scene and its readers do not need is left out, and the plan says so, also when that changes.
+//! Law 8: work that a scene and its readers do not need is omitted, and the plan reports this, also after changes.
 
 use crate::rig::{ALL, Rig, ball, body, scene};
 use sweepd::wire::Demand;
 
-/// The part of the plan about `part`: what was chosen, and why.
+/// The choice for `part` in the plan, and its reason.
 fn chosen(rig: &Rig, part: &str) -> Option<String> {
     let mut choices = rig.engine.plan().choices.iter();
     choices
@@ -31,7 +31,7 @@ fn the_plan_says_what_is_computed_for_readers_when_they_come_and_a_while_after_t
     assert!(rig.out.plan_changed && !is_left_out(&rig, "contacts"));
     assert!(chosen(&rig, "contacts").unwrap().contains("reads"));
     assert!(!is_left_out(&rig, "bounds") && is_left_out(&rig, "regions"));
-    // A reader that is gone for a few ticks makes no news.
+    // A reader that is gone for a few ticks does not change the plan.
     rig.engine.note_sent(0);
     rig.demand.contacts = false;
     (0..10).for_each(|_| assert!(!rig.send(ALL).plan_changed));
@@ -45,7 +45,7 @@ fn the_plan_says_what_is_computed_for_readers_when_they_come_and_a_while_after_t
 
 #[test]
 fn the_plan_tells_the_axis_that_sweep_and_prune_leaves_out_on_a_floor() {
-    // 12 by 12 boxes of 0.9 m side by side on one level: along z all overlap.
+    // 12 by 12 boxes of side 0.9 m next to each other at one height: all of them overlap along z.
     let shape = "{ type = \"box\", half_extents = [0.45, 0.45, 0.45] }";
     let boxes: Vec<String> = (0..144_u64)
         .map(|at| body(at + 1, [(at % 12) as f64, (at / 12) as f64, 0.0], shape, ""))
@@ -57,7 +57,7 @@ fn the_plan_tells_the_axis_that_sweep_and_prune_leaves_out_on_a_floor() {
     let mut told_at = None;
     for tick in 0..200_u64 {
         for at in 0..144_u64 {
-            // Each goes up and down at its own time: along z the ends pass one another, a few in a tick.
+            // Each box moves up and down with its own phase, so that along z a few ends pass each other in each tick.
             let phase = (at * 7 + tick) % 200;
             rig.row(at + 1).position[2] = phase.abs_diff(100) as f64 * 1e-3;
         }

@@ -1,5 +1,5 @@
-//! 4.4: a tick that takes longer than a heartbeat is told of meanwhile, by a `tick` alone. Each look at the clock takes a
-//! millisecond here.
+//! Law 4.4: a tick that takes longer than a heartbeat is announced meanwhile by a bare `tick` message. Each clock read
+//! takes a millisecond here.
 
 use sweepd::time::{Budget, Clock};
 use sweepd::wire::{MessageHeader, Reason, RejectReason, State, WIRE_VERSION};
@@ -20,7 +20,7 @@ fn pairs() -> Rig {
 #[test]
 fn law_4_4_a_tick_longer_than_a_heartbeat_sends_tick_alone_between_its_slices() {
     let mut rig = pairs();
-    // Something to carry: a row of a body that is not there.
+    // A row of a nonexistent body, so that a counter of the boot is not 0.
     rig.rows[0].body = 9_999;
     rig.send(Budget::time_ns(0));
     rig.rows[0].body = 1;
@@ -48,13 +48,13 @@ fn law_4_4_a_tick_longer_than_a_heartbeat_sends_tick_alone_between_its_slices() 
         assert_eq!(pulse.reasons, Reason::Undecided.bit());
         assert_eq!((pulse.bodies, pulse.candidates), (2 * PAIRS, PAIRS));
         assert_eq!(pulse.cause, row.cause);
-        // Nobody's frame has its result in it.
+        // The announcement is the result of no frame.
         assert_eq!((pulse.sources_len, row.sources_len), (0, 1));
-        // What counts up in a boot does not fall back.
+        // Counters of the boot do not decrease.
         assert_eq!(pulse.missed, before.missed);
         assert_eq!(pulse.rejects, row.rejects);
         assert!(pulse.sent_ns > last_ns);
-        // Ten milliseconds for looks of a frame, and of the stages before.
+        // Thirty clock reads of tolerance, for the frame and the earlier stages.
         let late_ns = pulse.sent_ns - last_ns;
         assert!(late_ns <= HEARTBEAT_NS + 30 * LOOK_NS, "{late_ns} ns");
         last_ns = pulse.sent_ns;
@@ -63,7 +63,7 @@ fn law_4_4_a_tick_longer_than_a_heartbeat_sends_tick_alone_between_its_slices() 
     assert!(row.sent_ns > last_ns, "the tick itself is the newest");
 }
 
-/// A request is done as a whole, however many edits it has.
+/// All edits of a request are applied in one tick, however many they are.
 #[test]
 fn bug_while_a_large_request_was_applied_nobody_heard_of_it() {
     let mut rig = pairs();
@@ -83,7 +83,7 @@ fn bug_while_a_large_request_was_applied_nobody_heard_of_it() {
         assert_eq!(pulse.header.tick, rig.out.tick.header.tick);
         last_ns = pulse.sent_ns;
     }
-    // A look for each eight edits, checked and applied.
+    // One clock read per eight edits, both when they are checked and when they are applied.
     assert!((8..=11).contains(&rig.pulses.len()), "{}", rig.pulses.len());
 }
 

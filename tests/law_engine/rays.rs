@@ -1,4 +1,4 @@
-//! What a ray hits: against closed forms, cut off at any unit, and where places are not known.
+//! The hit of a ray: against closed forms, with work cut off after any unit, and with unknown poses.
 
 mod doubts;
 mod grazes;
@@ -36,7 +36,7 @@ fn ask(world: &World, json: &str) -> RayFound {
     question(world, json).unwrap().answer(&SystemClock)
 }
 
-/// One body of each kind at random, far enough apart that most rays meet several.
+/// Two bodies of each kind at random poses, close enough together that most rays meet several.
 fn crowd(rng: &mut Rng) -> (Rig, BTreeMap<String, (usize, Pose)>) {
     let kinds: Vec<usize> = (0..18).map(|id| id % 9).collect();
     let bodies: Vec<String> = (1..)
@@ -55,7 +55,7 @@ fn crowd(rng: &mut Rng) -> (Rig, BTreeMap<String, (usize, Pose)>) {
     (rig, placed)
 }
 
-/// What a ray meets first of all bodies.
+/// The first body that a ray meets, with the distance.
 fn first(
     placed: &BTreeMap<String, (usize, Pose)>,
     from: &Vec3,
@@ -69,7 +69,7 @@ fn first(
     met.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Beside the hit the surface goes on as the normal says, but for an edge between.
+/// Checks that the surface next to the hit is perpendicular to the normal, unless there is an edge.
 fn check_normal(
     found: &RayFound,
     ((kind, pose), t): (&(usize, Pose), f64),
@@ -126,10 +126,11 @@ fn the_first_hit_is_that_of_closed_forms() {
             );
             let (low, high) = (found.t_min_m, found.t_max_m.unwrap());
             assert!(low <= t + 1e-12 && t - 1e-12 <= high, "{t} {what}");
-            // How deep it is in a round shape is proved to some 1e-8 of its size, where it begins better.
+            // The depth in a round shape is proved to about 1e-8 of its size, which limits the accuracy where the ray
+            // begins.
             assert!(high - low < 1e-5, "{t} {what}");
             assert!((found.t_best_m.unwrap() - t).abs() < 1e-9, "{t} {what}");
-            // A ray may begin within several.
+            // A ray may begin inside several bodies.
             let told = found.body.clone().unwrap();
             let alone = BTreeMap::from([(told.clone(), placed[&told])]);
             let own = first(&alone, &from, &direction).map(|(own, _)| own);
@@ -237,7 +238,7 @@ fn planes_height_fields_and_rays_along_axes_are_met_where_they_are() {
         sunk.inside && sunk.t_max_m == Some(0.0) && sunk.normal.is_none(),
         "{sunk:?}"
     );
-    // From above, onto the slope of the tip; from the side, into the wall.
+    // From above onto the slope of the tip; from the side onto the wall.
     let slope = of([0.5, 0.1, 3.0], [0.0, 0.0, -1.0], "");
     assert_eq!((slope.body.as_deref(), slope.shape), (Some("b1"), Some(0)));
     assert!(slope.triangle.is_some() && slope.t_min_m > 2.0 && slope.t_min_m < 3.0);
@@ -247,7 +248,7 @@ fn planes_height_fields_and_rays_along_axes_are_met_where_they_are() {
         3.0,
         [1.0, 0.0, 0.0],
     );
-    // Far away, and told apart by groups.
+    // Far away, and selected by groups.
     at(
         &of([-10.0, 0.0, 10.0], [1e6 + 9.0, 0.0, -10.0], ", \"mask\": 4"),
         "b2",
@@ -280,7 +281,7 @@ fn bodies_that_may_be_in_the_way_are_named_and_too_many_are_told() {
     assert_eq!(lost.verdict, Verdict::Possible.code(), "{lost:?}");
     rig.send(NONE);
     let found = ask(rig.engine.world(), &along);
-    // Those that found no room begin behind the hit.
+    // The pairs that did not fit begin behind the hit.
     assert!(found.complete && found.left_out == 0, "{found:?}");
     assert_eq!(found.body.as_deref(), Some("b1"));
     assert!((found.t_best_m.unwrap() - 8.01).abs() < 1e-9, "{found:?}");
@@ -321,7 +322,7 @@ fn bodies_that_may_be_in_the_way_are_named_and_too_many_are_told() {
     }
 }
 
-/// An angle found from a cosine is lost there; a piece of the ray then lies beside it.
+/// An angle computed from a cosine loses its digits there; a piece of the ray then lay beside the ray.
 #[test]
 fn bug_a_ray_near_the_z_axis_is_asked_along_its_own_direction() {
     let wall = "{ type = \"half_space\", normal = [-1, 0, 0], offset = -7e-6 }";
@@ -350,10 +351,10 @@ fn bug_a_ray_near_the_z_axis_is_asked_along_its_own_direction() {
     }
 }
 
-/// A cube of 2 m as a mesh that is a solid.
+/// A cube of side 2 m as a solid mesh.
 const CUBE: &str = "{ type = \"trimesh\", solid = true, vertices = [[-1, -1, -1], [1, -1, -1], [-1, 1, -1], [1, 1, -1], [-1, -1, 1], [1, -1, 1], [-1, 1, 1], [1, 1, 1]], faces = [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7], [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5]] }";
 
-/// The ray is free until it is in the box of the cube, which is its surface: all pieces of it begin there.
+/// The ray is free until it enters the box of the cube, which is its surface: all later pieces of the ray begin there.
 #[test]
 fn bug_a_solid_mesh_along_the_axes_is_hit_where_it_is() {
     let mut rig = Rig::new(&scene("", &[body(1, [0.0; 3], CUBE, "")]));
@@ -366,7 +367,7 @@ fn bug_a_solid_mesh_along_the_axes_is_hit_where_it_is() {
     };
     let third = 1.0 / 3.0;
     for (at, far) in [
-        // Onto a face, its diagonal, an edge, a corner, askew; and along a face, whose plane it is in.
+        // Onto a face, its diagonal, an edge, a corner, at an angle; and along a face, in its plane.
         ([0.3, 0.2, 1.0], [0.0, 0.0, 1.0]),
         ([0.25, 0.25, -1.0], [0.0, 0.0, -2.0]),
         ([0.3, 1.0, third], [0.5, 2.0, 0.1]),
@@ -381,7 +382,7 @@ fn bug_a_solid_mesh_along_the_axes_is_hit_where_it_is() {
         assert!(least <= far.norm() + 1e-12, "{at} {found:?}");
         let in_plane = far.y == 0.0 && at.z == 1.0 && far.z == 0.0;
         assert!(most >= far.norm() - 1e-12, "{at} {found:?}");
-        // What it only skims it never surely hits: by the end of its way along it, at most.
+        // A ray in the plane of a face need not count as a hit; its upper end is at most the end of the face.
         let wide = if in_plane { 2.0 } else { 1e-9 };
         assert!(most - least <= wide + 1e-12, "{at} {found:?}");
         let off = (found.t_best_m.unwrap() - far.norm()).abs();

@@ -1,4 +1,4 @@
-//! 4.5: what is left of a budget after the outbox was handed over is used, and the next tick tells what was found.
+//! Law 4.5: the rest of a budget after publishing is used, and the next tick publishes its results.
 
 use sweepd::math::Pose;
 use sweepd::time::Budget;
@@ -6,10 +6,10 @@ use sweepd::wire::{Event, Stage, State, Verdict, pair_flags};
 
 use crate::rig::{ALL, NONE, Rig, ball, has, scene};
 
-/// Longer than the time that is kept back for sending, and no more: nothing is decided before the outbox goes out.
+/// Just longer than the time reserved for sending: nothing is decided before the outbox is handed over.
 const SHORT: Budget = Budget::time_ns(900_000);
 
-/// Two balls whose boxes overlap, after a tick in which all was decided and sending took long.
+/// Two balls with overlapping boxes, after a tick in which all was decided and sending took long.
 fn two(at: [f64; 2]) -> Rig {
     let mut rig = Rig::new(&scene("", &[ball(1, 0.0, ""), ball(2, 0.0, "")]));
     rig.place(2, &Pose::translation(at[0], at[1], 0.0));
@@ -18,7 +18,7 @@ fn two(at: [f64; 2]) -> Rig {
     rig
 }
 
-/// What a tick keeps back of its end for the query under way.
+/// Time that a tick reserves at its end for the query in progress.
 const LAST_NS: u64 = 6_000;
 const TOUCHING: [f64; 2] = [1.2, 1.2];
 const APART: [f64; 2] = [1.5, 1.5];
@@ -165,7 +165,7 @@ fn law_4_5_no_work_goes_on_past_the_deadline_nor_under_a_budget_of_units() {
     rig.send(NONE);
     assert_eq!(rig.verdict(1, 2), Verdict::Possible);
     assert_eq!(rig.out.tick.stage_ns[usize::from(Stage::Rest.code())], 0);
-    // Unit budgets replay bit for bit.
+    // Unit budgets have no rest, so that they replay bit for bit.
     assert!(!rig.engine.work_on(u64::MAX));
     rig.send(NONE);
     assert_eq!(rig.verdict(1, 2), Verdict::Possible);
@@ -190,7 +190,7 @@ fn law_4_5_time_that_does_not_reach_to_rank_the_pairs_is_used_all_the_same() {
     second(&mut rig, TOUCHING);
     rig.send(SHORT);
     assert_eq!(rig.out.tick.possible, count);
-    // One microsecond is left, and the clock stands.
+    // One microsecond is left, and the clock stands still.
     rig.clock.advance(900_000 - LAST_NS - 1_000);
     assert!(!rig.engine.work_on(u64::MAX), "all is decided");
     rig.send(NONE);

@@ -1,4 +1,4 @@
-//! A scene as text, an engine, and hands to move its bodies.
+//! A scene as text, an engine, and functions that move its bodies.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -15,7 +15,7 @@ use sweepd::wire::{
 };
 use sweepd::world::Edit;
 
-/// Between two frames.
+/// Time between two frames.
 pub(crate) const FRAME_NS: u64 = 10_000_000;
 pub(crate) const ALL: Budget = Budget::UNLIMITED;
 pub(crate) const NONE: Budget = Budget {
@@ -25,7 +25,7 @@ pub(crate) const NONE: Budget = Budget {
 
 const PAIRS_APART_M: f64 = 10.0;
 
-/// A scene: what stands before the source, and its bodies.
+/// The text of a scene: `head`, which precedes the source, and its bodies.
 pub(crate) fn scene(head: &str, bodies: &[String]) -> String {
     let mut text =
         format!("frame_id = \"world\"\n{head}\n[[source]]\nname = \"feed\"\ntimeout_ms = 500\n");
@@ -35,12 +35,12 @@ pub(crate) fn scene(head: &str, bodies: &[String]) -> String {
     text
 }
 
-/// A body that moves, with `shape` as an inline table, at x, y, z.
+/// A moving body at `at`, with `shape` as an inline table.
 pub(crate) fn body(id: u64, at: [f64; 3], shape: &str, more: &str) -> String {
     format!("name = \"b{id}\"\nid = {id}\nmoves = true\nposition = {at:?}\nshape = {shape}\n{more}")
 }
 
-/// A ball of radius 1 m at x.
+/// A ball of radius 1 m at `x` on the x axis.
 pub(crate) fn ball(id: u64, x: f64, more: &str) -> String {
     body(
         id,
@@ -50,7 +50,7 @@ pub(crate) fn ball(id: u64, x: f64, more: &str) -> String {
     )
 }
 
-/// Two balls for each of `pairs` pairs far from one another, in the same place: b1 and b2, b3 and b4, ...
+/// `pairs` pairs of balls, far from each other; the two of a pair are at the same position: b1 and b2, b3 and b4, ...
 pub(crate) fn ball_pairs(pairs: u64) -> Rig {
     let balls: Vec<String> = (1..=2 * pairs)
         .map(|id| ball(id, ((id - 1) / 2) as f64 * PAIRS_APART_M, ""))
@@ -60,7 +60,7 @@ pub(crate) fn ball_pairs(pairs: u64) -> Rig {
     rig
 }
 
-/// Puts the second ball of each pair where it is seen from the first.
+/// Moves the second ball of each pair to this position relative to the first.
 pub(crate) fn put_pairs(rig: &mut Rig, pairs: u64, [x, y]: [f64; 2]) {
     for pair in 0..pairs {
         let at = Pose::translation(pair as f64 * PAIRS_APART_M + x, y, 0.0);
@@ -83,32 +83,32 @@ pub(crate) struct Rig {
     pub(crate) clock: Arc<ManualClock>,
     pub(crate) rows: Vec<TransformRow>,
     pub(crate) demand: Demand,
-    /// Whose frames are sent.
+    /// Source of the frames.
     pub(crate) source: &'static str,
     pub(crate) session: u64,
     pub(crate) epoch: u64,
-    /// The next frames say no time of the sender's.
+    /// Whether the next frames have no timestamp of the sender.
     pub(crate) unstamped: bool,
-    /// Sessions whose client is gone, told with the next frame.
+    /// Sessions whose client has disconnected, reported with the next frame.
     pub(crate) ended: Vec<u64>,
     pub(crate) flags: u32,
-    /// Linear and angular velocity of each row, or empty.
+    /// Linear and angular velocity of each row; empty: none are sent.
     pub(crate) velocities: Vec<[f64; 6]>,
-    /// What goes with the next frame.
+    /// Vertices sent with the next frame.
     pub(crate) vertices: Vec<VertexFrame>,
     pub(crate) out: Outbox,
-    /// What the next frames say of their ticks' end; 0: nothing.
+    /// Deadline of the next frames; 0: none.
     pub(crate) deadline_ns: u64,
     pub(crate) time_left_ns: u64,
-    /// Revision of the scene that the next frames need.
+    /// Scene revision that the next frames wait for.
     pub(crate) scene_rev: u64,
-    /// Between a frame's receipt and its tick.
+    /// Time from a frame's receipt to its tick.
     pub(crate) waited_ns: u64,
-    /// Between a tick's wake-up and the tick.
+    /// Time from a tick's wake-up to the tick.
     pub(crate) woken_ns: u64,
-    /// Ticks that went out alone while the last one was under way.
+    /// Announcements sent during the last tick.
     pub(crate) pulses: Vec<TickRow>,
-    /// Whether the whole structure is checked after each tick.
+    /// Whether every structure is validated after each tick.
     pub(crate) checked: bool,
     pub(crate) seq: u64,
     inbox: Inbox,
@@ -167,13 +167,13 @@ impl Rig {
         self.row(id).position[0] = x;
     }
 
-    /// A frame with the rows as they are, and a tick.
+    /// Sends a frame with the current rows, and runs a tick.
     pub(crate) fn send(&mut self, budget: Budget) -> &Outbox {
         self.frame();
         self.tick(budget, &[], TickCause::Frame)
     }
 
-    /// Frames one after the other, the rows of each as `set` makes them, and one tick.
+    /// Sends several frames, with rows set by `set`, and runs one tick.
     #[allow(dead_code, reason = "of the tests that share this rig one sends so")]
     pub(crate) fn send_several(
         &mut self,
@@ -191,14 +191,14 @@ impl Rig {
         self.tick(budget, &[], TickCause::Frame)
     }
 
-    /// A tick without a frame, `after_ns` later.
+    /// Runs a tick without a frame, `after_ns` later.
     pub(crate) fn idle(&mut self, after_ns: u64, budget: Budget) -> &Outbox {
         self.clock.advance(after_ns);
         self.inbox.clear();
         self.tick(budget, &[], TickCause::Heartbeat)
     }
 
-    /// A tick with vertices and no frame, `after_ns` later.
+    /// Runs a tick with vertices and without a frame, `after_ns` later.
     #[allow(dead_code, reason = "of the tests that share this rig one sends so")]
     pub(crate) fn idle_with_vertices(&mut self, after_ns: u64, budget: Budget) -> &Outbox {
         self.clock.advance(after_ns);
@@ -207,20 +207,20 @@ impl Rig {
         self.tick(budget, &[], TickCause::Heartbeat)
     }
 
-    /// How many were refused for a reason in this boot.
+    /// The number of rejections for a reason in this boot.
     #[allow(dead_code, reason = "as above")]
     pub(crate) fn rejects(&self, reason: RejectReason) -> u64 {
         self.out.tick.rejects[usize::from(reason.code())]
     }
 
-    /// A tick with edits and no frame.
+    /// Runs a tick with edits and without a frame.
     pub(crate) fn edit(&mut self, edits: Vec<Edit>, budget: Budget) -> &Outbox {
         self.clock.advance(FRAME_NS);
         self.inbox.clear();
         self.tick_with(edits, budget)
     }
 
-    /// A tick with edits and a frame with the rows as they are.
+    /// Runs a tick with edits and a frame with the current rows.
     #[allow(dead_code, reason = "of the tests that share this rig one sends so")]
     pub(crate) fn send_with(&mut self, edits: Vec<Edit>, budget: Budget) -> &Outbox {
         self.frame();
@@ -302,12 +302,12 @@ impl Rig {
         &self.out
     }
 
-    /// The widest interval is kept from tick to tick: here it is looked for among all rows.
+    /// The engine maintains the widest interval from tick to tick; this compares it with the maximum over all rows.
     fn check_widest(&self) {
         if !self.demand.pairs || self.out.pairs_header.truncated > 0 {
             return;
         }
-        // A row of a pair that is apart is there for its event, or its way.
+        // A row of a pair that is apart counts only if it has a swept flag; others are there for their event.
         let counts = |row: &&PairRow| {
             let way = pair_flags::SWEPT_HIT | pair_flags::SWEPT_OPEN;
             row.verdict > Verdict::Apart.code() || row.flags & way != 0
@@ -324,7 +324,8 @@ impl Rig {
         rows.find(|row| (row.body_a, row.body_b) == (a, b))
     }
 
-    /// The published verdict of a pair; no row, or the last row of a pair that is no candidate any more: apart.
+    /// The published verdict of a pair. Apart if there is no row, or only the last row of a pair that is no longer a
+    /// candidate.
     pub(crate) fn verdict(&self, a: u64, b: u64) -> Verdict {
         let row = self
             .pair(a, b)

@@ -1,4 +1,4 @@
-//! 4.7: who has a turn first when the budget does not reach for all, and that nobody waits for ever.
+//! Law 4.7: the order in which pairs get turns if the budget does not suffice, and that no pair waits for ever.
 
 use sweepd::math::Vec3;
 use sweepd::time::Budget;
@@ -8,8 +8,8 @@ use crate::oracle::meshes::{bumpy_sphere, trimesh};
 use crate::oracle::rng::Rng;
 use crate::rig::{ALL, Rig, body, scene};
 
-/// Where the second ball of a pair stands, seen from the first: at this distance, off all axes, so that their boxes
-/// overlap while the balls are apart.
+/// Position of the second ball of a pair relative to the first: at this distance, away from all axes, so that their
+/// boxes overlap while the balls are apart.
 fn offset(distance_m: f64, turn_rad: f64) -> [f64; 3] {
     let (s, c) = turn_rad.sin_cos();
     let (x, y) = ((c - s) / 2.0_f64.sqrt(), (c + s) / 2.0_f64.sqrt());
@@ -22,7 +22,7 @@ fn ball(id: u64, at: [f64; 3], priority: f64) -> String {
     body(id, at, shape, &format!("priority = {priority:?}"))
 }
 
-/// Pairs far from one another, each apart by 0.1 m.
+/// Pairs far from each other, each with a gap of 0.1 m.
 fn pairs(priorities: &[f64]) -> Rig {
     let mut bodies = Vec::new();
     for (pair, priority) in priorities.iter().enumerate() {
@@ -34,13 +34,13 @@ fn pairs(priorities: &[f64]) -> Rig {
     Rig::new(&scene("", &bodies))
 }
 
-/// Puts the second ball of a pair.
+/// Moves the second ball of a pair to this position relative to the first.
 fn put(rig: &mut Rig, pair: usize, [dx, dy, dz]: [f64; 3]) {
     let row = rig.row(2 * pair as u64 + 2);
     row.position = [20.0 * pair as f64 + dx, dy, dz];
 }
 
-/// Pairs that have a verdict in the last tick.
+/// Which pairs have a verdict in the last tick.
 fn decided(rig: &Rig, pairs: usize) -> Vec<bool> {
     let possible = Verdict::Possible.code();
     let open = |pair: usize| {
@@ -51,15 +51,16 @@ fn decided(rig: &Rig, pairs: usize) -> Vec<bool> {
     (0..pairs).map(|pair| !open(pair)).collect()
 }
 
-/// Ticks that a pair waits for a turn at most, as `narrow/order.rs` states it.
+/// Upper bound of the ticks that a pair waits for a turn, as stated in `narrow/order.rs`.
 ///
-/// * `pairs` - that wait at the same time; `turns` - a tick; `ratio` - of the greatest weight to the least.
+/// * `pairs` - number of pairs that wait at the same time; `turns` - turns per tick; `ratio` - greatest weight
+///   divided by the least.
 fn longest_wait(pairs: u64, turns: u64, ratio: u64) -> u64 {
     let round = pairs.div_ceil(turns);
     ratio * (16 + 2).max(round + 1) + round
 }
 
-/// The factor of what comes nearer.
+/// Factor on the weight of approaching pairs.
 const CLOSING: u64 = 4;
 
 #[test]
@@ -82,7 +83,7 @@ fn law_4_7_with_random_motion_priorities_and_a_viewpoint_no_pair_waits_longer_th
     let (mut longest, mut waiting) = (0, 0);
     for _ in 0..1_500 {
         for pair in 0..PAIRS {
-            // In and out of contact, some at rest: half of all that moves is in touch at its last test.
+            // Pairs enter and leave contact, some rest: about half of the moving pairs touch at their last test.
             if rng.below(4) > 0 {
                 put(
                     &mut rig,
@@ -94,7 +95,7 @@ fn law_4_7_with_random_motion_priorities_and_a_viewpoint_no_pair_waits_longer_th
         rig.send(Budget::units(UNITS));
         let decided = decided(&rig, PAIRS);
         waiting = waiting.max(decided.iter().filter(|decided| !**decided).count());
-        // A turn decides a convex pair.
+        // One turn decides a convex pair.
         for (wait, decided) in waits.iter_mut().zip(decided) {
             *wait = if decided { 0 } else { *wait + 1 };
             longest = longest.max(*wait);
@@ -117,7 +118,7 @@ fn bug_contacts_that_were_confirmed_each_tick_kept_all_others_waiting() {
     let mut rig = pairs(&[1.0; PAIRS]);
     let place = |rig: &mut Rig, tick: usize| {
         for pair in 0..PAIRS {
-            // What touches, touches by less than it moves in a tick.
+            // The depth of a contact is less than the motion in a tick.
             let distance_m = if pair < CONTACTS { 1.999 } else { 2.1 };
             put(rig, pair, offset(distance_m, 0.15 * tick as f64));
         }
@@ -135,8 +136,8 @@ fn bug_contacts_that_were_confirmed_each_tick_kept_all_others_waiting() {
 
 #[test]
 fn bug_pairs_that_no_turn_decided_kept_all_others_waiting() {
-    // Side by side and asked from the roots at each pose, for a plane would part them at once; and a ball in the hollow
-    // of a solid, which no plane parts from it.
+    // First, spheres side by side with searches that restart from the roots at each pose, since a plane would separate
+    // them at once; second, a ball in the cavity of a solid, which no plane separates from it.
     let ball = bumpy_sphere(24, 48, 0.01);
     let large = |by: f64| ball.clone().scaled(Vec3::new(by, by, by));
     let hollow = large(2.0).and(large(1.06).inverted());
@@ -152,7 +153,7 @@ fn bug_pairs_that_no_turn_decided_kept_all_others_waiting() {
     );
 }
 
-/// Pairs of meshes that are never decided, so far apart in every tick and turned anew, beside pairs of balls.
+/// Pairs of meshes that are never decided, with this gap and a new rotation in every tick, next to pairs of balls.
 fn no_turn_decides(search: &str, meshes: [&str; 2], apart_m: f64) {
     const MESHES: usize = 4;
     const BALLS: usize = 6;
@@ -182,7 +183,7 @@ fn no_turn_decides(search: &str, meshes: [&str; 2], apart_m: f64) {
         for pair in 0..MESHES + BALLS {
             let distance_m = if pair < MESHES { apart_m } else { 2.1 };
             put(&mut rig, pair, offset(distance_m, 0.15 * f64::from(tick)));
-            // What turns so far has nothing left of what was proved.
+            // After such a rotation no earlier proof is valid.
             let [x, y, z, w] = *rng.rotation().as_vector().as_ref();
             rig.row(2 * pair as u64 + 2).orientation = [x, y, z, w];
         }
@@ -218,7 +219,7 @@ fn law_4_7_a_pair_has_turns_by_its_priority_and_none_waits_longer_than_its_share
     let mut turns = [0_usize; PAIRS];
     let mut oldest = 0;
     for tick in 0..TICKS {
-        // Each pair turns by more than its gap, neither nearer nor farther: no certificate outlives a tick.
+        // Each pair turns by more than its gap at a constant distance: no certificate is valid in the next tick.
         for pair in 0..PAIRS {
             put(&mut rig, pair, offset(2.1, 0.15 * tick as f64));
         }
@@ -231,14 +232,14 @@ fn law_4_7_a_pair_has_turns_by_its_priority_and_none_waits_longer_than_its_share
     let (urgent, rest) = turns.split_last().unwrap();
     let mean = rest.iter().sum::<usize>() as f64 / rest.len() as f64;
     assert!(*urgent as f64 > 3.0 * mean, "{urgent} against {mean}");
-    // Ten ticks a round, and a turn in two for the urgent one.
+    // A round takes ten ticks, and the urgent pair gets every second turn.
     assert!(oldest <= 16, "{oldest} ticks without a verdict: {turns:?}");
     assert!(rest.iter().all(|turns| *turns >= TICKS / 16), "{turns:?}");
 }
 
-/// Pairs 20 m from one another along x, seen as a viewpoint says; how many turns each has had, all moving in each tick.
+/// Pairs 20 m apart along x, in the view of a viewpoint; all move in each tick. Returns the number of turns of each.
 ///
-/// * `camera_m` - x of a body that stands aside of them and looks along y.
+/// * `camera_m` - x of a body beside the pairs that looks along y.
 fn turns_in_view(viewpoint: &str, camera_m: Option<f64>) -> Vec<usize> {
     const PAIRS: usize = 24;
     let mut bodies = Vec::new();
@@ -275,7 +276,7 @@ fn turns_in_view(viewpoint: &str, camera_m: Option<f64>) -> Vec<usize> {
 
 #[test]
 fn law_4_7_what_is_in_view_has_turns_before_what_is_not_and_its_middle_before_its_edge() {
-    // From the side onto the tenth pair; at 60 m, 0.7 rad to each side reach over two neighbours.
+    // Side view of pair 10; at 60 m a half-angle of 0.7 rad covers two neighbours on each side.
     let view = "position = [200.0, -60.0, 0.0]\ndirection = [0.0, 2.0, 0.0]\nhalf_angle_rad = 0.7\nweight = 8.0";
     let turns = turns_in_view(view, None);
     let unseen = [&turns[..7], &turns[14..]].concat();
@@ -310,7 +311,7 @@ fn law_4_7_what_comes_nearer_is_asked_before_what_moves_away() {
     let mut rig = pairs(&[1.0, 1.0]);
     rig.send(ALL);
     assert_eq!(decided(&rig, 2), [true, true]);
-    // Both by 0.15 m, more than their gaps.
+    // Both balls move by 0.15 m, more than their gaps.
     put(&mut rig, 0, offset(2.25, 0.0));
     put(&mut rig, 1, offset(1.95, 0.0));
     rig.send(Budget::units(1));

@@ -1,5 +1,5 @@
-//! The searches of mesh pairs, chosen by name: each gives the same answers when there is time, and sound ones when there
-//! is not. Against brute force over all triangles.
+//! The search methods for mesh pairs, chosen by name: with enough time all give the same answers, and otherwise sound
+//! ones. Truth: brute force over all triangles.
 
 use std::path::Path;
 
@@ -25,14 +25,14 @@ fn soups() -> [Soup; 3] {
     ]
 }
 
-/// Pairs of meshes far from one another; the last two have a second shape, and so no front of their own.
+/// Pairs of meshes far from each other; the last two have a second shape and thus no front of their own.
 fn text(search: &str) -> String {
     let mut bodies = Vec::new();
     for pair in 0..PAIRS {
         for k in 0..2 {
             let mesh = trimesh(&soups()[(pair + k) % 3], None);
             let shape = if pair >= PAIRS - 2 {
-                // Within each of the solids: it never touches what they do not.
+                // Inside each of the solids, so that it touches only what they touch.
                 let speck = "{ type = \"sphere\", radius = 0.001, position = [0.75, 0.0, 0.0] }";
                 format!("[{mesh}, {speck}]")
             } else {
@@ -59,7 +59,7 @@ fn row_of(rig: &Rig, pair: usize) -> Option<&PairRow> {
     rig.out.pairs.iter().find(|row| row.body_a == a)
 }
 
-/// Poses of B near touching, overlapping or anywhere, moving on from where it was half of the time.
+/// A pose of B near contact, overlapping or anywhere; in half of the cases a small step from the last pose.
 fn next(rng: &mut Rng, pose: &Pose, pair: usize) -> Pose {
     let home = Vec3::new(AWAY_M * pair as f64, 0.0, 0.0);
     if rng.below(2) == 0 {
@@ -149,12 +149,12 @@ fn every_search_of_mesh_pairs_gives_the_same_verdicts_without_a_limit_and_sound_
     }
     assert!(colliding > 2 * ticks && apart > 2 * ticks);
     assert!(open.iter().all(|open| *open > ticks / 4), "{open:?}");
-    // What is carried leaves fewer open than the baselines.
+    // Methods with carried state leave fewer pairs open than the baselines.
     assert!(open[0] < open[2] && open[0] < open[3], "{open:?}");
 }
 
-/// Where two touched is no estimate any more once balls within them tell that they overlap: it was kept, and rows told
-/// the gap there, and how fast it closed.
+/// Once inner balls prove an overlap, the last contact point is no estimate any more. It was kept, and rows had the gap
+/// there and its closing speed.
 #[test]
 fn bug_an_overlap_told_by_balls_is_not_shown_where_the_two_touched_before() {
     let round = trimesh(&bumpy_sphere(16, 24, 0.02), None);
@@ -171,7 +171,7 @@ fn bug_an_overlap_told_by_balls_is_not_shown_where_the_two_touched_before() {
         touching.gap_best_m.is_finite() && touching.gap_max_m > -1e-3,
         "{touching:?}"
     );
-    // Deep, and on another side; two units are a look at the old touch and one at the balls.
+    // Deep, and on another side. The two units pay for a retest of the old contact and a test of the inner balls.
     rig.place(2, &Pose::translation(0.0, 0.8, 0.0));
     rig.send(Budget::units(2));
     let deep = *row_of(&rig, 0).unwrap();

@@ -1,4 +1,4 @@
-//! 3.2, 3.3, 4.6: what once was said of meshes, half-spaces and height fields, through the engine.
+//! Laws 3.2, 3.3, 4.6: bugs with meshes, half-spaces and height fields, through the engine.
 
 use sweepd::math::{Pose, Quat, Vec3, pose_from};
 use sweepd::narrow::gap_between;
@@ -36,7 +36,7 @@ fn law_4_6_a_half_space_turned_by_a_fifth_of_a_radian_sweeps_what_stands_far_fro
             ),
         );
         rig.send(budget);
-        // The side at +x rises by 10 sin 0.2 = 1.99 m.
+        // The edge at +x rises by 10 sin 0.2 = 1.99 m.
         let want = if budget == ALL {
             Verdict::Colliding
         } else {
@@ -49,7 +49,7 @@ fn law_4_6_a_half_space_turned_by_a_fifth_of_a_radian_sweeps_what_stands_far_fro
     }
 }
 
-/// Each is a half-space and a second shape.
+/// Each body consists of a half-space and a second shape.
 #[test]
 fn bug_two_bodies_with_half_spaces_never_met_though_their_other_shapes_did() {
     let cube = trimesh(&meshes::cuboid(Vec3::repeat(0.5)), None);
@@ -62,7 +62,7 @@ fn bug_two_bodies_with_half_spaces_never_met_though_their_other_shapes_did() {
         for method in ["brute", "sap", "grid", "hash", "hgrid", "order"] {
             let run = format!("[run]\nbroad_phase = \"{method}\"\n");
             let mut rig = Rig::new(&scene(&run, &[with(1, 1, one), with(2, -1, other)]));
-            // Above the floor of the one and below the ceiling of the other, 3.5 m from both.
+            // Above the floor of one body and below the ceiling of the other, 3.5 m from both.
             for (x, z, gap_m) in [
                 (3.0, 0.0, 2.0),
                 (3.1, 0.0, 2.1),
@@ -100,7 +100,8 @@ fn bug_two_bodies_with_half_spaces_never_met_though_their_other_shapes_did() {
 
 #[test]
 fn law_3_2_a_peg_in_its_hole_turned_by_a_hundredth_of_a_radian() {
-    // Peg 2 m long in a hole 0.5 m deep: 5 mm of clearance on each side, turned about z its corners come 0.005 nearer.
+    // A peg of length 2 m in a hole 0.5 m deep, with 3 or 6 mm of clearance on each side; a rotation of 0.01 rad about
+    // z brings its corners about 5 mm closer.
     let hole = trimesh(&meshes::block_with_hole(1.0, 0.5, 0.25), None);
     for (clearance, angle, collides) in [
         (0.003, 0.01, true),
@@ -160,7 +161,7 @@ fn law_3_3_a_torus_round_a_rod_is_no_collision_until_it_is_moved_against_it() {
         let x = 0.01 * f64::from(k);
         rig.move_x(2, x);
         rig.send(ALL);
-        // The tube's inner side is at 0.7, the rod's at 0.5 (the facets of the mesh lie a little farther out).
+        // The inner radius of the tube is 0.7, the radius of the rod 0.5 (the facets of the mesh lie slightly outside).
         if x < 0.19 {
             assert_eq!(rig.verdict(1, 2), Verdict::Apart, "{x}");
         }
@@ -185,7 +186,7 @@ fn law_3_3_a_ball_inside_a_solid_mesh_collides_and_inside_a_surface_it_does_not(
         ));
         rig.send(ALL);
         assert_eq!(rig.verdict(1, 2), want, "solid = {solid}");
-        // It flies out through the wall in one step, and back.
+        // It moves out through the wall in one step, and back.
         rig.move_x(2, 5.0);
         rig.send(ALL);
         assert_eq!(rig.verdict(1, 2), Verdict::Apart);
@@ -205,12 +206,12 @@ fn law_3_2_a_height_field_has_a_top_walls_and_a_floor() {
     let cases = [
         ([0.0, 0.0, 1.6], false),
         ([0.0, 0.0, 1.4], true),
-        // Beside the wall at x = 2, half way down, and below the floor at -0.5.
+        // Next to the wall at x = 2, half way down, and below the floor at -0.5.
         ([3.1, 0.0, -0.2], false),
         ([2.9, 0.0, -0.2], true),
         ([0.0, 0.0, -1.6], false),
         ([0.0, 0.0, -1.4], true),
-        // Round the upper edge at (2, 2, 0).
+        // Around the upper corner at (2, 2, 0).
         ([2.7, 2.7, 0.7], false),
         ([2.5, 2.5, 0.5], true),
     ];
@@ -233,8 +234,8 @@ fn law_3_2_a_height_field_has_a_top_walls_and_a_floor() {
 
 #[test]
 fn bug_a_solid_and_a_body_of_several_shapes_were_told_as_deeper_than_any_point_of_them_can_be() {
-    // No point is deeper than a quarter of a metre in the terrain, which is half a metre thick at most, nor deeper than
-    // 0.2 m in the body, where the post and a triangle of the terrain are parted by 0.3 m and more.
+    // No point is deeper than 0.25 m in the terrain, which is at most 0.5 m thick, nor deeper than 0.2 m in the body,
+    // whose post is 0.3 m and more from a triangle of the terrain.
     let terrain = "{ type = \"height_field\", heights = [[0.0, 0.3, 0.0], [0.3, 0.1, 0.2], [0.0, 0.2, 0.0]], size = [2.0, 2.0], base_m = 0.2 }";
     let knob = "{ type = \"sphere\", radius = 0.2 }";
     let post = "{ type = \"box\", half_extents = [0.1, 0.1, 0.3], position = [0.2, 0.0, 0.0] }";
@@ -242,7 +243,7 @@ fn bug_a_solid_and_a_body_of_several_shapes_were_told_as_deeper_than_any_point_o
     let mut still = body(101, [0.0; 3], terrain, "");
     still = still.replace("moves = true", "moves = false");
     let mut rig = Rig::new(&scene("", &[still, body(41, [0.0; 3], &several, "")]));
-    // Steps by which it was seen: xorshift64 (Marsaglia 2003).
+    // The random numbers with which the bug was found: xorshift64 (Marsaglia 2003).
     let mut state = 88_172_645_463_325_252_u64;
     let mut unit = move || {
         state ^= state << 13;
@@ -268,7 +269,8 @@ fn bug_a_solid_and_a_body_of_several_shapes_were_told_as_deeper_than_any_point_o
     assert!(deep > 100, "{deep} ticks");
 }
 
-/// A ball and the ball of another body, a thousand kilometres from that body's origin; they are deep by some nanometres.
+/// A ball, and a ball of another body that is a thousand kilometres from its body's origin; they overlap by some
+/// nanometres.
 #[test]
 fn bug_what_touched_last_was_known_better_than_the_place_of_a_part_far_from_its_bodys_origin() {
     let ball = "{ type = \"sphere\", radius = 0.5 }";
@@ -300,7 +302,7 @@ fn bug_what_touched_last_was_known_better_than_the_place_of_a_part_far_from_its_
         rig.place(2, &at(Vec3::zeros()));
         rig.send(Budget::units(units));
         let row = rig.pair(1, 2).unwrap();
-        // No number as large as that place is known any better.
+        // Coordinates of this size are not known more accurately.
         let off = 1e6 * f64::EPSILON;
         assert!(row.gap_best_m < 0.0, "after {units}: {row:?}");
         assert!(
@@ -310,14 +312,14 @@ fn bug_what_touched_last_was_known_better_than_the_place_of_a_part_far_from_its_
     }
 }
 
-/// Turned by quarters and at decimal places, a kilometre from the origins of their bodies: what composing their poses
-/// loses is more than they are apart by.
+/// Quarter turns and decimal positions, a kilometre from the origins of the bodies: the rounding error of the composed
+/// poses exceeds the gap.
 #[test]
 fn bug_shapes_far_from_their_bodies_are_not_proved_to_overlap_where_rounding_alone_says_so() {
     const HALF: f64 = std::f64::consts::FRAC_1_SQRT_2;
     let gem = "type = \"convex\", vertices = [[0.3, 0, 0], [-0.3, 0, 0], [0, 0.3, 0], [0, -0.3, 0], [0, 0, 0.3], [0, 0, -0.3]]";
     let turn = [0.0, HALF, 0.0, HALF];
-    // Gaps by 400 bits.
+    // Gaps computed with 400 bits.
     let cases = [
         (
             "position = [-626.9554710763733, -1320.663211605125, -107.75250794802987], \
@@ -352,7 +354,8 @@ fn bug_shapes_far_from_their_bodies_are_not_proved_to_overlap_where_rounding_alo
         let row = rig.pair(1, 2).unwrap();
         let held = row.gap_min_m <= gap_m && gap_m <= row.gap_max_m;
         assert!(held, "{gap_m} {row:?}");
-        // Rounding tells no overlap from a touch: it collides, and says so.
+        // Rounding hides the difference between overlap and contact: the pair counts as colliding, with the flag for
+        // touching.
         assert_eq!(rig.verdict(1, 2), Verdict::Colliding, "{row:?}");
         assert_ne!(row.flags & pair_flags::TOUCHING, 0, "{row:?}");
     }

@@ -1,4 +1,4 @@
-//! 3.6 the state in one word, 3.7 unknown bodies.
+//! Laws 3.6, the state in one word, and 3.7, unknown bodies.
 
 use sweepd::math::{Pose, Vec3};
 use sweepd::wire::{BodyStatus, Demand, Reason, RejectReason, State, Verdict};
@@ -24,7 +24,7 @@ fn law_3_6_the_first_that_applies_of_colliding_unknown_possible_near_clear() {
         "unknown bodies hide no collision"
     );
     assert!(rig.because(Reason::NotReceived));
-    // As does every message of the tick.
+    // Every message of the tick has the same state.
     for message in [
         &rig.out.pairs_header,
         &rig.out.changes_header.message,
@@ -94,16 +94,16 @@ fn law_3_6_held_and_removed_bodies_are_not_clear() {
 
 #[test]
 fn law_3_7_a_pair_that_was_proved_apart_is_possible_once_a_body_of_it_is_stale() {
-    // The boxes overlap, the balls do not; nothing moves when the time-out comes.
+    // The boxes overlap, the balls do not; nothing moves when the timeout expires.
     let ball = |id, at| body(id, at, "{ type = \"sphere\", radius = 1.0 }", "");
     let mut bodies = vec![ball(1, [0.0; 3]), ball(2, [1.5; 3])];
-    // Enough others that a tick which changes two bodies is a small one.
+    // Enough other bodies that two changed bodies are few.
     bodies.extend((3..40).map(|id| ball(id, [10.0 * id as f64, 0.0, 0.0])));
     let mut rig = Rig::new(&scene("", &bodies));
     rig.send(ALL);
     assert_eq!(rig.out.tick.candidates, 1);
     assert_eq!(rig.state(), State::Clear);
-    // The others go on, these two are sent no more.
+    // Only the other bodies are sent from here on.
     rig.rows.retain(|row| row.body > 2);
     for _ in 0..60 {
         rig.send(ALL);
@@ -115,7 +115,7 @@ fn law_3_7_a_pair_that_was_proved_apart_is_possible_once_a_body_of_it_is_stale()
 
 #[test]
 fn law_3_7_the_reaches_of_two_stale_bodies_that_approach_add() {
-    // The gap is 1 m: each alone reaches 0.6 m when the pair is lost, both together 1.2 m.
+    // The gap is 1 m. When the poses become stale each body can have moved 0.6 m, both together 1.2 m.
     for (speeds, possible) in [((1.2, 1.2), true), ((1.2, 0.1), false), ((0.9, 0.9), false)] {
         let more = |speed: f64| format!("max_speed_mps = {speed}");
         let bodies = [ball(1, 0.0, &more(speeds.0)), ball(2, 3.0, &more(speeds.1))];
@@ -128,7 +128,7 @@ fn law_3_7_the_reaches_of_two_stale_bodies_that_approach_add() {
         assert_eq!(verdict == Verdict::Possible, possible, "{speeds:?}");
         assert_eq!(rig.state(), State::Unknown);
         assert!(rig.because(Reason::Stale));
-        // And when it goes on, it grows.
+        // The reach grows while the silence lasts.
         rig.idle(140_000_000, ALL);
         let far = (speeds.0 + speeds.1) * 0.65 >= 1.0;
         assert_eq!(rig.verdict(1, 2) == Verdict::Possible, far, "{speeds:?}");
@@ -145,7 +145,7 @@ fn law_3_7_a_stale_pair_with_overlapping_boxes_widens_with_its_reach() {
             "max_speed_mps = 0.5",
         )
     };
-    // 0.6 m apart, boxes overlap.
+    // The gap is 0.6 m, and the boxes overlap.
     let mut rig = Rig::new(&scene("", &[ball(1, [0.0; 3]), ball(2, [1.5, 1.5, 1.5])]));
     rig.send(ALL);
     assert_eq!(rig.out.tick.candidates, 1);
@@ -163,7 +163,7 @@ fn law_3_7_a_stale_pair_with_overlapping_boxes_widens_with_its_reach() {
     );
 }
 
-/// The bound that its verdict had needed was told, widened once more by the whole reach in each tick.
+/// The published bound was the one that the verdict had needed, and the whole reach widened it again in each tick.
 #[test]
 fn bug_a_stale_mesh_was_possible_beyond_its_reach_and_its_interval_grew_from_tick_to_tick() {
     let cube = "{ type = \"trimesh\", vertices = [[-0.2, -0.2, -0.2], [0.2, -0.2, -0.2], [-0.2, 0.2, -0.2], \
@@ -193,7 +193,7 @@ fn bug_a_stale_mesh_was_possible_beyond_its_reach_and_its_interval_grew_from_tic
             &Pose::from_parts(nalgebra::Translation3::identity(), turn),
         );
         rig.place(2, &Pose::translation(x, -0.3, 0.0));
-        // Contacts would want the gap in any case.
+        // A demand for contacts would compute the gap anyway.
         rig.demand = Demand {
             pairs: true,
             ..Demand::default()
@@ -205,7 +205,7 @@ fn bug_a_stale_mesh_was_possible_beyond_its_reach_and_its_interval_grew_from_tic
         } else {
             seen.abs().add_scalar(-0.2).map(|out| out.max(0.0)).norm() - 0.1
         };
-        // From a metre on a reach is no bound.
+        // A reach of a metre or more is no bound.
         for age in 1..100 {
             rig.idle(FRAME_NS, ALL);
             let reach_m = if age < 50 { 0.0 } else { f64::from(age) * 0.01 };
@@ -215,7 +215,8 @@ fn bug_a_stale_mesh_was_possible_beyond_its_reach_and_its_interval_grew_from_tic
                 reach_m >= gap_m,
                 "{place}"
             );
-            // As wide as the reach makes it; and by what the verdict alone had left open, where nothing else decides it.
+            // The interval is as wide as the reach makes it, plus what the verdict left open if nothing else decides
+            // it.
             let loose_m = if gap_m > 0.5 { 1e-8 } else { 0.5 };
             for row in &rig.out.pairs {
                 assert!(row.gap_min_m >= gap_m - reach_m - loose_m, "{place}");
@@ -296,14 +297,14 @@ fn budget_zero_is_sound_and_never_clear_while_boxes_overlap() {
 fn law_4_2_bug_a_client_that_follows_one_that_has_just_gone_loses_no_frame() {
     let mut rig = Rig::new(&scene("", &[ball(1, 0.0, ""), ball(2, 9.0, "")]));
     rig.send(ALL);
-    // Its end and the first frame of the next come with one tick.
+    // The end of the old session and the first frame of the next one arrive in one tick.
     (rig.session, rig.ended) = (12, vec![11]);
     rig.move_x(2, 1.5);
     rig.send(ALL);
     assert_eq!(rig.rejects(RejectReason::SourceTaken), 0);
     assert_eq!(rig.out.tick.sources[0].session, 12);
     assert_eq!(rig.state(), State::Colliding);
-    // One that is still heard is not followed, and who is gone stays over.
+    // While a session is active no other replaces it, and an ended session does not come back.
     (rig.session, rig.ended) = (13, vec![11]);
     rig.send(ALL);
     assert_eq!(rig.rejects(RejectReason::SourceTaken), 1);
@@ -318,7 +319,7 @@ fn law_6_bug_the_row_of_a_new_session_has_no_number_of_the_one_before() {
     for _ in 0..5 {
         rig.send(ALL);
     }
-    // The first frame of the next session waits for a revision of the scene.
+    // The first frame of the next session waits for a scene revision.
     (rig.session, rig.ended, rig.scene_rev) = (12, vec![11], 99);
     rig.send(ALL);
     let row = rig.out.tick.sources[0];

@@ -1,4 +1,4 @@
-//! How many threads a tick may work with: asked for by the scene, told in the plan.
+//! The number of threads a tick may use: set by the scene, published in the plan.
 
 use std::path::Path;
 
@@ -35,7 +35,7 @@ fn threads_are_set_by_the_scene_and_told_in_the_plan_where_they_matter() {
     assert!(!plan_of(&said).contains("\"threads\""));
 }
 
-/// What an engine of a scene says of its plan.
+/// The plan of an engine for this scene, as JSON.
 fn plan_of(scene: &Scene) -> String {
     let rig = Rig::of(scene);
     rig.engine.plan().to_json()

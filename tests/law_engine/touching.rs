@@ -1,5 +1,5 @@
-//! What a body or a shape touches or would touch: by brute force over all bodies, by moving the body and looking at the
-//! tick, and cut off at any unit.
+//! The bodies that a body or a shape touches or would touch: by brute force over all bodies, by moving the body and
+//! reading the tick, and with work cut off after any unit.
 
 mod rules;
 
@@ -27,7 +27,7 @@ const SHAPES: [&str; 6] = [
     "{ type = \"height_field\", heights = [[0, 0.3, 0], [0.2, 0, 0.1], [0, 0.4, 0.2]], size = [2, 2], base_m = 0.2 }",
 ];
 
-/// A question with its shapes built, as the daemon's worker does it.
+/// A question with its shapes built, as the daemon's worker builds them.
 fn question(world: &World, json: &str) -> Result<TouchingQuestion, String> {
     let json = format!("{{\"touching\": {json}}}");
     let Request::Ask(asked) = Request::parse(json.as_bytes(), &[])? else {
@@ -71,7 +71,7 @@ fn named<'a>(world: &'a World, name: &str) -> &'a Body {
     world.body(world.slot_named(name).unwrap()).unwrap()
 }
 
-/// Bodies of every kind in a cube, some of a group that no other collides with, over a floor.
+/// Bodies of every kind in a cube above a floor; some are in a group that collides only with itself.
 fn crowd(rng: &mut Rng) -> Rig {
     let mut bodies = vec![
         "name = \"floor\"\nid = 99\nmoves = false\nshape = { type = \"half_space\", normal = [0, 0, 1], offset = -2.5 }\n".to_owned(),
@@ -100,7 +100,7 @@ fn scatter(rig: &mut Rig, rng: &mut Rng) {
     }
 }
 
-/// Verdict and lower end of the gap of every body, whatever the boxes say.
+/// Verdict and lower end of the gap of every body, without the use of boxes.
 fn by_force(world: &World, asked: &Body, but: &str, filters: bool) -> BTreeMap<String, (f64, f64)> {
     let own = world.slot_named(but);
     let others = world.bodies().filter(|(slot, _)| Some(*slot) != own);
@@ -148,7 +148,7 @@ fn rows_are_those_of_brute_force_and_of_the_body_that_was_moved_there() {
                     "{what}"
                 );
             }
-            // The engine itself, with the body there.
+            // The engine's own result with the body at that pose.
             let was = named(world, &name).pose;
             rig.place(id, &pose);
             rig.send(ALL);
@@ -180,7 +180,7 @@ fn rows_are_those_of_brute_force_and_of_the_body_that_was_moved_there() {
             } else {
                 assert!(told.is_superset(&touched), "{what}");
             }
-            // And where it stands, without a pose.
+            // A question without a pose uses the current pose.
             let here = ask(rig.engine.world(), &format!("{{\"body\": \"{name}\"}}"));
             assert_eq!(names(&here), touched, "{what} {here:?}");
             rig.place(id, &was);

@@ -1,5 +1,5 @@
-//! 3.9: events of messages that reached none of their readers come with the next one that does, each once and in its
-//! order. Balls go to and fro by chance, and messages are lost by chance; readers keep what rows tell them.
+//! Law 3.9: events in messages that reached no reader come with the next message that does, each once and in order.
+//! Balls move randomly, and messages are lost randomly; readers keep lists from the rows.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,7 +14,7 @@ fn ids(row: &PairRow) -> Ids {
     (row.body_a, row.body_b)
 }
 
-/// Which collisions a reader was told of, and how many begins.
+/// The collisions reported to a reader as begun, and the number of begins.
 #[derive(Default)]
 struct Told {
     open: BTreeSet<Ids>,
@@ -22,7 +22,7 @@ struct Told {
 }
 
 impl Told {
-    /// Takes the rows of a message: each event fits what was told before.
+    /// Applies the rows of a message; asserts that each event follows from the earlier ones.
     fn take<'a>(&mut self, rows: impl Iterator<Item = &'a PairRow>, what: &str) {
         for row in rows {
             let what = format!("{what}: {row:?}");
@@ -42,7 +42,7 @@ impl Told {
     }
 }
 
-/// `pairs` as a door sends them to those who lack events.
+/// `pairs` as a door sends them to readers that lack events.
 fn mended(out: &Outbox) -> BTreeMap<Ids, PairRow> {
     let rows = out.pairs.iter().chain(&out.owed);
     let mut rows: BTreeMap<_, _> = rows.map(|row| (ids(row), *row)).collect();
@@ -90,9 +90,9 @@ fn colliding(rig: &Rig) -> BTreeSet<Ids> {
     rows.map(ids).collect()
 }
 
-/// Plays a run; returns how many begins each reader was told.
+/// Plays a run; returns the number of begins that each reader received.
 ///
-/// * `pair_rows` - that fit into a message.
+/// * `pair_rows` - number of pair rows that fit in a message.
 fn play(seed: u64, pair_rows: usize) -> [u64; 3] {
     let mut random = Random::new(seed);
     let head = format!("[limits]\npair_rows = {pair_rows}\n");
@@ -112,7 +112,7 @@ fn play(seed: u64, pair_rows: usize) -> [u64; 3] {
         rig.demand.changes_anew = lost.changes || tick == 1;
         rig.send(ALL);
         all.take(rig.out.pairs.iter(), &what);
-        // In the end nothing is lost any more.
+        // Near the end no message is lost any more.
         let is_lost = |chance: f64| chance < 0.5 && tick < 380;
         lost = Undelivered {
             messages: 1,

@@ -1,6 +1,6 @@
-//! 4.5: while work remains at least 90 % of what a budget leaves above the floor is used, and what is at or above its
-//! floor ends in time. Each look at the clock takes a microsecond here, so that every unit of work takes time, a cheap
-//! one an eighth of what a dear one does.
+//! Law 4.5: while work remains, at least 90 % of the budget above the floor is used, and ticks with a budget at or
+//! above the floor end in time. Each clock read takes a microsecond here, so that every unit of work takes time, a
+//! cheap one an eighth of that of an expensive one.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -12,31 +12,32 @@ use crate::oracle::meshes::{torus, trimesh};
 use crate::rig::{FRAME_NS, Rig, ball_pairs, body, put_pairs, scene};
 
 const LOOK_NS: u64 = 1_000;
-/// What handing the outbox over takes, and what it takes the first time.
+/// Duration of handing the outbox over, and of doing so the first time.
 const SEND_NS: u64 = 20_000;
 const FIRST_SEND_NS: u64 = 120_000;
-/// The last of them is told by the one behind it.
+/// Number of ticks; one more follows, which reports the rest of the last.
 const TICKS: usize = 8;
-/// A budget that is well above the floor, to learn it.
+/// A budget well above the floor, used to measure the floor.
 const LEARNING_NS: u64 = 400_000;
-/// What the budgets leave above it. Of less than the first a tenth is less than what is kept back for the query under
-/// way at the end.
+/// Budgets above the floor. Below the first of these, a tenth of it would be less than the time reserved for the query
+/// in progress at the end.
 const ABOVES_NS: [u64; 4] = [100_000, 170_000, 300_000, 500_000];
-/// Longest slice of what is done after the outbox was handed over.
+/// Longest slice of work after the outbox is handed over.
 const SLICE_NS: u64 = 50_000;
 /// Pairs of meshes.
 const LINKS: u64 = 110;
-/// Where the second body of a pair stands in every other tick, seen from the first: each pair is open again.
+/// Alternating position of the second body of a pair relative to the first, so that each pair is open again in each
+/// tick.
 const PLACES: [[f64; 2]; 2] = [[1.2, 1.2], [1.5, 1.5]];
 
-/// What a tick had, took and used, nanoseconds.
+/// Budget, duration and use of a tick, nanoseconds.
 struct Used {
     row: TickRow,
-    /// In narrowing, before the outbox went out and after.
+    /// Time in the narrow phase, before and after the outbox is handed over.
     narrowed_ns: u64,
-    /// From the tick's end to the end of all its work; less than nothing: it was over before.
+    /// Time from the tick's deadline to the end of all its work; negative if it ended before the deadline.
     late_ns: i64,
-    /// Pairs without a verdict at that end.
+    /// Pairs without a verdict at the end of all work.
     open: u64,
 }
 
@@ -44,19 +45,20 @@ fn stage(row: &TickRow, stage: Stage) -> u64 {
     row.stage_ns[usize::from(stage.code())]
 }
 
-/// Ticks as the daemon runs them: outbox, sending, what is left.
+/// Runs ticks as the daemon does: outbox, sending, rest of the budget.
 ///
-/// * `put` - makes the poses of a tick, which leave every pair open.
+/// * `put` - sets the poses of a tick, at which every pair is open.
 fn run(rig: &mut Rig, put: impl Fn(&mut Rig, usize), budget_ns: u64) -> Vec<Used> {
     rig.checked = false;
     rig.clock.step_each_read(LOOK_NS);
     let mut all: Vec<Used> = Vec::new();
     for tick in 0..=TICKS {
         put(rig, tick);
-        // This look and the two of a frame's receipt and its tick's wake-up.
+        // This clock read, and those of the frame's receipt and the tick's wake-up.
         let end_ns = rig.clock.monotonic_ns() + FRAME_NS + 2 * LOOK_NS + budget_ns;
         rig.send(Budget::time_ns(budget_ns));
-        // For long after the first more is kept back than sending takes: it is to be used behind it.
+        // For long after the first tick the reserve exceeds the duration of sending; the difference must be used after
+        // sending.
         let send_ns = if tick == 0 { FIRST_SEND_NS } else { SEND_NS };
         rig.clock.advance(send_ns);
         rig.engine.note_sent(send_ns);
@@ -76,13 +78,13 @@ fn run(rig: &mut Rig, put: impl Fn(&mut Rig, usize), budget_ns: u64) -> Vec<Used
     all
 }
 
-/// Runs a scene anew within several budgets.
+/// Runs a new engine for each of several budgets.
 ///
-/// * `aboves_ns` - of the budgets, what they have above the floor.
+/// * `aboves_ns` - the budgets, as time above the floor.
 fn check(make: impl Fn() -> Rig, put: impl Fn(&mut Rig, usize), aboves_ns: &[u64]) {
     let floor_ns = run(&mut make(), &put, LEARNING_NS)[TICKS - 1].row.floor_ns;
     for &above_ns in aboves_ns {
-        // The first tick does not know what sending takes, and the next counts it.
+        // The first tick does not know the duration of sending, which the second one uses.
         let ticks = run(&mut make(), &put, floor_ns + above_ns);
         for (at, used) in ticks.iter().enumerate().skip(2) {
             let row = &used.row;
@@ -110,7 +112,7 @@ fn law_4_5_nine_tenths_of_what_is_left_above_the_floor_are_used_on_convex_pairs(
 
 #[test]
 fn law_4_5_nine_tenths_of_what_is_left_above_the_floor_are_used_on_meshes() {
-    // Links of chains: no plane parts them.
+    // Linked rings, which no plane separates.
     let shape = trimesh(&torus(1.0, 0.3, 36, 24), None);
     let bodies: Vec<String> = (0..2 * LINKS)
         .map(|k| body(k + 1, [10.0 * (k / 2) as f64, 0.0, 0.0], &shape, ""))

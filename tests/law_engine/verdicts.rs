@@ -1,4 +1,4 @@
-//! 3.4 verdicts, 3.11 conventions.
+//! Laws 3.4, verdicts, and 3.11, conventions.
 
 use sweepd::math::{Point, Vec3, pose_from};
 use sweepd::scene::PairAction;
@@ -86,7 +86,8 @@ fn law_3_4_a_pair_rule_overrides_the_bodies_and_holds_at_once_for_a_pair_at_rest
     assert_eq!(rig.verdict(1, 2), Verdict::Near);
 }
 
-/// A rule of one body with very many others: they are found within its distance, and its distance widens no other.
+/// A rule of one body with very many others: these are found within the distance of the rule, which enlarges no other
+/// box.
 #[test]
 fn bug_a_rule_of_one_body_with_many_widened_the_boxes_of_all() {
     const MANY: u64 = 4200;
@@ -103,7 +104,7 @@ fn bug_a_rule_of_one_body_with_many_widened_the_boxes_of_all() {
         for x in [300.0, 6000.5] {
             rig.move_x(MANY + 1, x);
             rig.send(ALL);
-            // A touch is nearer than that, too.
+            // Bodies in contact are within that distance, too.
             let apart_m = |id: u64| (3.0 * id as f64 - x).abs() - 2.0;
             let near = (1..=MANY).filter(|id| apart_m(*id) < WITHIN_M).count() as u64;
             let tick = rig.out.tick;
@@ -134,7 +135,7 @@ fn law_3_4_touching_collides_and_is_flagged() {
 #[test]
 fn law_3_11_a_has_the_smaller_id_normals_point_from_a_to_b_and_both_frames_agree() {
     let shape = "{ type = \"box\", half_extents = [0.5, 0.4, 0.3] }";
-    // The file names the larger id first.
+    // The larger id comes first in the file.
     let bodies = [
         body(9, [0.0; 3], shape, ""),
         body(4, [0.7, 0.1, 0.0], shape, ""),
@@ -151,13 +152,13 @@ fn law_3_11_a_has_the_smaller_id_normals_point_from_a_to_b_and_both_frames_agree
         assert_eq!((contact.body_a, contact.body_b), (4, 9));
         let normal = Vec3::from(contact.normal);
         assert!((normal.norm() - 1.0).abs() < 1e-12);
-        // From A (at x = 0.7) to B (at x = 0).
+        // The normal points from A (at x = 0.7) to B (at x = 0).
         assert!(normal.dot(&(other.translation.vector - turned.translation.vector)) > 0.0);
         let world_a = turned * Point::from(contact.point_a_body);
         let world_b = other * Point::from(contact.point_b_body);
         assert!((world_a - Point::from(contact.point_a)).norm() < 1e-12);
         assert!((world_b - Point::from(contact.point_b)).norm() < 1e-12);
-        // B's point is `gap` from A's along the normal: against it, where they overlap.
+        // B's point is at `gap` from A's point along the normal; a negative gap means against it.
         let across = Point::from(contact.point_b) - Point::from(contact.point_a);
         assert!(
             (across.dot(&normal) - contact.gap_m).abs() < 1e-9,
@@ -190,7 +191,7 @@ fn law_3_11_output_is_ordered_by_ids() {
     );
 }
 
-/// Positive while they come nearer; of points on turning bodies, and of a partner that cannot move.
+/// Positive while the bodies approach; for points of turning bodies, and for a partner that cannot move.
 #[test]
 fn law_6_how_fast_a_gap_shrinks_is_told_where_velocities_are() {
     let near = "report_within_m = 3.0";
@@ -212,7 +213,7 @@ fn law_6_how_fast_a_gap_shrinks_is_told_where_velocities_are() {
             0.0,
         ),
         ([[-1.0, 0.5, 0.0, 0.0, 0.0, 0.0], still], -1.0, 0.5),
-        // Balls that turn about their own centres do not come nearer.
+        // Balls that turn about their own centres do not approach each other.
         (
             [
                 [0.0, -2.0, 0.0, 0.0, 0.0, 9.0],
@@ -235,7 +236,7 @@ fn law_6_how_fast_a_gap_shrinks_is_told_where_velocities_are() {
     }
 }
 
-/// Old and silent senders, and vertices that go their own way, had the speed of the pose they were last sent with.
+/// Bodies with stale poses, and vertices with their own motion, had the velocity of the last pose.
 #[test]
 fn bug_how_fast_a_gap_shrinks_is_not_told_of_what_is_silent_or_deforms() {
     let near = "report_within_m = 30.0";

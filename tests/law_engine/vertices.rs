@@ -1,4 +1,4 @@
-//! Law 3.7 and 4.2 for vertices: what a sender may say, and what becomes of what it may not.
+//! Laws 3.7 and 4.2 for vertices: the accepted messages, and the effect of refused ones.
 
 use sweepd::wire::{
     BodyStatus, RejectReason, State, Verdict, VertexFrame, VertexHeader, WIRE_VERSION, frame_flags,
@@ -9,7 +9,7 @@ use crate::rig::{ALL, FRAME_NS, NONE, Rig, body, scene};
 use sweepd::wire::Reason;
 use sweepd::world::{Edit, Put};
 
-/// A square of two triangles in the plane of x and y, of side 2.
+/// A square of side 2 m in the x-y plane, as two triangles.
 const SHEET: &str = "{ type = \"trimesh\", solid = false, \
     vertices = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]], \
     faces = [[0, 1, 2], [0, 2, 3]] }";
@@ -25,7 +25,7 @@ fn rig() -> Rig {
     ))
 }
 
-/// The sheet at a height in its own frame.
+/// The vertices of the sheet at a height in its own frame.
 fn at(z: f32) -> Vec<[f32; 3]> {
     vec![
         [-1.0, -1.0, z],
@@ -69,7 +69,7 @@ fn status(rig: &Rig, id: u64) -> BodyStatus {
     BodyStatus::from_code(row.status).unwrap()
 }
 
-/// A tick with poses and these vertices.
+/// Runs a tick with poses and these vertices.
 fn send(rig: &mut Rig, vertices: Vec<VertexFrame>) {
     rig.vertices = vertices;
     rig.send(ALL);
@@ -88,7 +88,7 @@ fn law_3_7_a_body_that_deforms_is_not_received_until_its_pose_and_all_vertices_h
     assert_eq!(status(&rig, 1), BodyStatus::NotReceived);
     assert_eq!(rig.state(), State::Unknown);
     assert!(rig.because(Reason::NotReceived));
-    // A range of what nobody has sent says nothing, and is told.
+    // A range of vertices of which no full set has come is useless, and is reported.
     send(&mut rig, vec![range(2, 1, 0, at(0.0))]);
     assert_eq!(status(&rig, 1), BodyStatus::Rejected);
     assert_eq!(rig.rejects(RejectReason::VertexVersion), 1);
@@ -99,7 +99,7 @@ fn law_3_7_a_body_that_deforms_is_not_received_until_its_pose_and_all_vertices_h
 fn vertices_move_the_surface_in_the_tick_they_come_with_at_any_budget() {
     let mut rig = rig();
     known(&mut rig);
-    // One corner goes down so far that the sheet between it and the opposite one cuts an edge of the cube.
+    // One corner moves down so far that the sheet between it and the opposite corner cuts an edge of the cube.
     send(&mut rig, vec![range(2, 1, 2, vec![[1.0, 1.0, -3.5]])]);
     assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
     rig.vertices = vec![full(3, at(-2.4)), full(4, at(0.0))];
@@ -164,7 +164,7 @@ fn law_3_7_wrong_vertices_leave_the_last_good_ones_and_the_body_unknown_until_al
         let body = rig.engine.world().body(slot).unwrap();
         let tight = body.shapes[0].shape.aabb_at(&body.pose);
         assert!((tight.min.z - 3.0).abs() < 1e-9 && (tight.max.z - 3.0).abs() < 1e-9);
-        // A good pose is no vertex, and a range of what it had is none either.
+        // Neither a valid pose nor a range on top of the rejected vertices makes the vertices known.
         send(&mut rig, vec![]);
         assert_eq!(status(&rig, 1), BodyStatus::Rejected);
         send(&mut rig, vec![range(9, 1, 0, bent.clone())]);
@@ -191,7 +191,7 @@ fn vertices_that_come_again_or_late_change_nothing() {
         assert_eq!(rig.state(), State::Clear);
     }
     assert_eq!(rig.rejects(RejectReason::OldFrame), 3);
-    // The chain goes on from the newest.
+    // Later ranges continue from the newest version.
     send(&mut rig, vec![range(8, 7, 0, at(-2.6))]);
     assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
 }
@@ -228,7 +228,7 @@ fn law_4_2_only_the_session_that_moves_a_body_may_bend_it() {
 fn law_4_2_a_new_session_or_epoch_has_to_send_all_vertices() {
     let mut rig = rig();
     known(&mut rig);
-    // The world resets: its vertices may come ahead of its first frame.
+    // A new epoch: its vertices may come before its first frame.
     let mut first = full(1, at(0.2));
     first.header.epoch = 2;
     rig.vertices = vec![first];
@@ -237,11 +237,11 @@ fn law_4_2_a_new_session_or_epoch_has_to_send_all_vertices() {
     rig.epoch = 2;
     send(&mut rig, vec![]);
     assert_eq!(status(&rig, 1), BodyStatus::Known);
-    // What is left of the epoch before is passed over.
+    // Late messages of the old epoch are skipped.
     send(&mut rig, vec![full(9, at(-2.6))]);
     assert_eq!(rig.rejects(RejectReason::OldFrame), 1);
     assert_eq!(rig.state(), State::Clear);
-    // Another reset, of which only poses come: the shape of before is void.
+    // Another epoch, of which only poses come: the earlier vertices are void.
     rig.epoch = 3;
     send(&mut rig, vec![]);
     assert_eq!(status(&rig, 1), BodyStatus::NotReceived);
@@ -272,13 +272,13 @@ fn law_3_7_bug_after_lost_vertices_all_that_the_source_bent_is_unknown_until_all
     let (known, rejected) = (BodyStatus::Known, BodyStatus::Rejected);
     send(&mut rig, vec![of(1, 5, 1), of(3, 6, 1)]);
     assert_eq!(both(&rig), [known, known], "what came before is not needed");
-    // What is refused for another reason is not lost, nor is what says no number or comes twice.
+    // A message refused for another reason is not lost, and neither is one without a number or with a repeated number.
     send(
         &mut rig,
         vec![of(77, 7, 1), of(3, 8, 2), of(3, 0, 3), of(3, 8, 3)],
     );
     assert_eq!(both(&rig), [known, known]);
-    // Number 9 went: it may have been of either.
+    // Number 9 is lost; it may have been for either body.
     send(&mut rig, vec![of(3, 10, 4)]);
     assert_eq!(both(&rig), [rejected, known]);
     assert_eq!(rig.state(), State::Unknown);
@@ -288,7 +288,7 @@ fn law_3_7_bug_after_lost_vertices_all_that_the_source_bent_is_unknown_until_all
     (part.header.body, part.header.number) = (3, 13);
     send(&mut rig, vec![part]);
     assert_eq!(both(&rig), [rejected, rejected]);
-    // A new session counts anew.
+    // A new session has its own numbering.
     (rig.session, rig.ended) = (12, vec![11]);
     let of_next = [of(1, 2, 1), of(3, 3, 1)].map(|mut frame| {
         frame.header.session = 12;
@@ -302,7 +302,7 @@ fn law_3_7_bug_after_lost_vertices_all_that_the_source_bent_is_unknown_until_all
 fn law_4_2_bug_vertices_that_are_refused_do_not_end_a_session() {
     let mut rig = rig();
     known(&mut rig);
-    // The source is silent for longer than its time-out; a stranger bends what cannot be bent.
+    // The source is silent for longer than its timeout; another session sends vertices for a rigid body.
     let mut rigid = full(1, at(0.0));
     (rigid.header.session, rigid.header.body) = (12, 2);
     rig.vertices = vec![rigid];
@@ -321,14 +321,14 @@ fn law_4_6_a_sheet_that_goes_there_and_back_has_gone_both_ways() {
     let slot = rig.engine.world().slot_of(sweepd::ids::BodyId(1)).unwrap();
     let path = |rig: &Rig| rig.engine.world().body(slot).unwrap().motion.path_m;
     let before = path(&rig);
-    // A number that f32 has.
+    // A number that f32 represents exactly.
     let step = 1.0 / 64.0;
     send(&mut rig, vec![full(2, at(step)), full(3, at(0.0))]);
     let gone = path(&rig) - before;
     assert!((0.03125..0.031_251).contains(&gone), "{gone}");
 }
 
-/// A solid that grows around a body of several shapes: the depth grows with it, and the bound must.
+/// A solid that grows around a body of several shapes: the bound must grow with the depth.
 #[test]
 fn bug_how_deep_a_compound_can_be_in_a_solid_grows_with_the_solid() {
     let corners = |half: f32| -> Vec<[f32; 3]> {
@@ -352,7 +352,7 @@ fn bug_how_deep_a_compound_can_be_in_a_solid_grows_with_the_solid() {
         let half = 1.2 + 0.05 * f32::from(step);
         send(&mut rig, vec![full(u64::from(step) + 1, corners(half))]);
         let row = rig.pair(1, 2).unwrap();
-        // The middle of the cube belongs to a ball.
+        // The centre of the cube lies in a ball.
         let depth = -f64::from(half);
         assert!(
             row.gap_min_m <= depth && depth <= row.gap_max_m + 0.5,
@@ -362,7 +362,7 @@ fn bug_how_deep_a_compound_can_be_in_a_solid_grows_with_the_solid() {
     }
 }
 
-/// It was known from then on, as the pose of what it had hung on was.
+/// It became known when detached, as the pose of its former parent was known.
 #[test]
 fn bug_what_hangs_on_vertices_that_are_not_known_is_not_known_once_it_is_let_go() {
     let hung = body(2, [0.0, 0.0, -3.0], CUBE, "attached_to = \"b1\"");
@@ -398,7 +398,7 @@ fn bug_what_hangs_on_vertices_that_are_not_known_is_not_known_once_it_is_let_go(
     }
 }
 
-/// The version of the sheet's vertices, and whether the tick is clear.
+/// The version of the sheet's vertices, and whether the state is clear.
 fn version(rig: &Rig) -> (Option<u64>, bool) {
     let world = rig.engine.world();
     let sheet = world.body(world.slot_named("b1").unwrap()).unwrap();
@@ -406,7 +406,7 @@ fn version(rig: &Rig) -> (Option<u64>, bool) {
     (version, rig.state() == State::Clear)
 }
 
-/// In its own frame the sheet goes down by as much as its pose goes up: no tick is to have the one without the other.
+/// In its own frame the sheet moves down by as much as its pose moves up: no tick may use only one of the two.
 #[test]
 fn law_4_3_bug_vertices_bent_the_old_pose_while_their_frame_waited_for_the_scene() {
     for wait_ends in [true, false] {
@@ -432,20 +432,20 @@ fn law_4_3_bug_vertices_bent_the_old_pose_while_their_frame_waited_for_the_scene
             assert_eq!(rig.out.tick.header.scene_rev, scene_rev);
             assert_eq!(version(&rig), (Some(2), true));
         } else {
-            // The revision does not come, and the next frame has all of it.
+            // The revision never comes, and the next frame contains everything.
             rig.idle(600_000_000, ALL);
             assert_eq!(version(&rig).0, Some(1));
             rig.send(ALL);
             assert_eq!(version(&rig), (Some(2), true));
         }
-        // In order behind what waits, and on.
+        // A range in order after the waiting one is accepted.
         send(&mut rig, vec![range(3, 2, 0, at(-2.5))]);
         assert_eq!(version(&rig), (Some(3), true));
         assert_eq!(status(&rig, 1), BodyStatus::Known);
     }
 }
 
-/// A body that the awaited edit puts has nothing to bend before.
+/// A body that the awaited edit puts does not exist before, so that its vertices must wait.
 #[test]
 fn law_4_3_bug_vertices_of_a_body_that_is_not_there_yet_were_refused_while_its_frame_waited() {
     let mut rig = rig();
@@ -467,7 +467,7 @@ fn law_4_3_bug_vertices_of_a_body_that_is_not_there_yet_were_refused_while_its_f
     assert_eq!(rig.rejects(RejectReason::UnknownBody), 0);
 }
 
-/// A pause overtakes frames that wait, and its number is beyond theirs.
+/// A pause is processed before frames that wait, although its number is higher than theirs.
 #[test]
 fn bug_vertices_behind_a_frame_that_waited_were_held_for_ever_by_a_pause() {
     let mut rig = rig();

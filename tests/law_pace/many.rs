@@ -1,4 +1,4 @@
-//! 4.4: of many frames that wait, none that says something no later one says is lost unsaid.
+//! Law 4.4: when many frames wait, none is dropped if it has information that no later frame contains.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use sweepd::world::{Body, Edit, Put};
 use crate::support::{MS, TIMEOUT_NS, cube, frame, moving, row};
 use crate::{Daemon, Tick, modes, ns, on_sim, robot, sim, two_bodies};
 
-/// Two bodies of the simulator, `b` and `c` (2 and 5) of the robot.
+/// A scene with two bodies, `b` and `c` (ids 2 and 5), of the robot.
 fn three() -> Scene {
     let mut scene = two_bodies(on_sim());
     let mut more = moving("c", 5);
@@ -40,7 +40,7 @@ fn x_of(daemon: &Daemon, name: &str) -> f64 {
     body(daemon, name).pose.translation.x
 }
 
-/// The robot moves a continuous body, put while the daemon runs.
+/// Puts a continuous body that the robot moves, while the daemon runs.
 fn put_bullet(daemon: &mut Daemon) {
     let mut bullet = moving("bullet", 4);
     (bullet.source, bullet.continuous) = (Some(1), true);
@@ -65,7 +65,7 @@ fn law_4_4_bug_a_partial_frame_of_a_source_that_does_not_lead_was_dropped_with_p
     frames.push((112.0, sim(2)));
     daemon.run(115.0, frames);
     assert_eq!((x_of(&daemon, "b"), x_of(&daemon, "c")), (7.0, 119.0));
-    // Each with its own stamps and age, and what was folded is counted.
+    // Each body has its own stamps and age, and folded frames are counted.
     assert_eq!(body(&daemon, "b").since_ns, Some(ns(10.0)));
     assert_eq!(body(&daemon, "c").since_ns, Some(ns(110.0)));
     assert!(daemon.passed_of(1) >= 36);
@@ -91,7 +91,7 @@ fn law_4_3_bug_a_pause_behind_a_folded_frame_renewed_what_was_folded_into_it() {
     frames.push((112.0, sim(2)));
     daemon.run(115.0, frames);
     assert_eq!((x_of(&daemon, "b"), x_of(&daemon, "c")), (7.0, 119.0));
-    // The first pause is the last that speaks of it.
+    // The pause at 11 ms is the last that covers `b`.
     assert!(body(&daemon, "b").since_ns <= Some(ns(11.0)));
     assert!(body(&daemon, "c").since_ns >= Some(ns(110.0)));
 }
@@ -113,7 +113,8 @@ fn law_4_4_bug_folded_frames_say_what_each_of_them_said() {
                 frame
             }
         };
-        // A whole one is the oldest; what the transport could not make out is not forgotten, but for a newer pose.
+        // The oldest frame is a full one; rows that the transport could not decode stay refused unless a newer pose
+        // comes.
         let mut whole = frame("robot", 1, 0, &[row(2, 7.0)]);
         whole.refused_bodies = vec![(2, RejectReason::BadChain), (5, RejectReason::BadChain)];
         let mut frames = vec![(10.0, say(whole, slow_speaks))];
@@ -136,7 +137,7 @@ fn law_4_4_bug_folded_frames_say_what_each_of_them_said() {
 fn law_1_no_frame_of_a_source_that_moves_a_continuous_body_is_passed_over() {
     for mode in modes() {
         let mut daemon = Daemon::of(mode.clone());
-        // The robot leads no tick.
+        // The robot is not the lead, so it makes no tick by its frames.
         put_bullet(&mut daemon);
         let frames = (1..=200).map(|seq| (4.0 + 0.05 * seq as f64, robot(seq)));
         let frames = frames.chain([(15.0, sim(1))]).collect();
@@ -171,7 +172,7 @@ fn law_1_bug_a_way_that_was_cut_for_want_of_room_was_told_as_clear() {
         path.is_blurred() && daemon.world.travelled() == [bullet]
     };
     assert!(!is_blurred(&daemon));
-    // Pauses in between take no room; one too many does.
+    // Pauses take no place in the queue; a frame too many does, and the path is blurred.
     let many = FRAMES_WAITING_MAX as u64;
     let mut frames: Vec<_> = (2..=many + 2)
         .map(|seq| (7.0, at(seq, seq as f64)))
@@ -189,7 +190,7 @@ fn law_1_bug_a_way_that_was_cut_for_want_of_room_was_told_as_clear() {
     assert_eq!(body(&daemon, "bullet").status, BodyStatus::Known);
     let unsent = body(&daemon, "unsent");
     assert!(!unsent.in_broad, "a start pose is no evidence");
-    // Told once: the next way is whole.
+    // Reported once: the next path is complete.
     daemon.run(12.0, vec![(11.0, at(many + 5, 0.0)), (11.5, sim(3))]);
     assert!(!is_blurred(&daemon));
     assert_eq!(daemon.world.counts().reasons & cut, 0);
@@ -224,7 +225,7 @@ fn law_4_3_bug_pauses_that_were_dropped_for_want_of_room_made_the_next_one_renew
         let all = |seq| frame("robot", seq, 0, &[row(2, 5.0), row(4, 0.0)]);
         let first = if followed { all(1) } else { robot(1) };
         daemon.run(8.0, vec![(6.0, first), (7.0, sim(1))]);
-        // The lead is silent for a while, not so long that it is dead.
+        // The lead is silent for a while, but not for a whole timeout.
         let pauses = (0..200).map(|k| (10.0 + 2.0 * k as f64, pause(2 + k)));
         daemon.run(452.0, pauses.chain([(451.0, sim(2))]).collect());
         assert_eq!(body(&daemon, "b").since_ns, Some(ns(408.0)));
@@ -235,7 +236,7 @@ fn law_4_3_bug_pauses_that_were_dropped_for_want_of_room_made_the_next_one_renew
         });
         daemon.run(1055.0, more.collect());
         assert_eq!(body(&daemon, "b").status, BodyStatus::Known);
-        // One that was lost on its way says nothing of what it held.
+        // After a lost frame a pause does not renew the poses that the lost frame may have held.
         daemon.run(1060.0, vec![(1056.0, pause(263)), (1057.0, sim(63))]);
         let since_ns = body(&daemon, "b").since_ns;
         assert_eq!(since_ns, Some(ns(1050.0)));

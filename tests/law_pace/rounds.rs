@@ -1,4 +1,4 @@
-//! 4.4, 4.5: a round waits for no one beyond what a frame in it can wait.
+//! Laws 4.4, 4.5: a round waits for no source longer than the frames in it allow.
 
 use sweepd::config::Mode;
 use sweepd::wire::Frame;
@@ -7,10 +7,10 @@ use crate::support::{MS, frame, row};
 use crate::{Daemon, LATE_NS, ns, robot, sim};
 
 const FLOOR_NS: u64 = MS;
-/// By how much `CLOCK_BOOTTIME` is ahead of `CLOCK_MONOTONIC`.
+/// Offset of `CLOCK_BOOTTIME` from `CLOCK_MONOTONIC`.
 const AHEAD_NS: u64 = 7_000 * MS;
 
-/// A daemon whose round at 10 ms waits for the robot, with a frame of the simulator as `make` makes it.
+/// The end of a round that waits for the robot from 10 ms on; its frame of the simulator is changed by `make`.
 fn round_ends_ms(make: impl Fn(&mut Frame)) -> f64 {
     let mut daemon = Daemon::of(Mode::OnAll);
     daemon.pacer.know(FLOOR_NS, AHEAD_NS);
@@ -28,7 +28,7 @@ fn round_ends_ms(make: impl Fn(&mut Frame)) -> f64 {
 fn law_4_5_bug_a_round_waited_beyond_the_deadline_that_its_own_frame_carries() {
     let late_ms = LATE_NS as f64 / MS as f64;
     assert_eq!(round_ends_ms(|_| {}), 10.0 + late_ms);
-    // Half of what is left above the floor.
+    // It waits for half of the time left above the floor.
     let left = |left_ms: u64| round_ends_ms(move |frame| frame.header.time_left_ns = left_ms * MS);
     assert_eq!(left(4), 11.5);
     assert_eq!(left(1), 10.0);

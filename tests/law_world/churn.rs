@@ -1,5 +1,5 @@
-//! Anything in any order: random frames (good and bad), sessions, pauses, edits and silences. After every tick the
-//! structure must hold, and the change sets alone must lead a listener to the same bodies in the broad phase.
+//! Random frames (valid and invalid), sessions, pauses, edits and silences in any order. After every tick the structure
+//! must be consistent, and the change sets alone must give a listener the bodies in the broad phase.
 
 use std::collections::BTreeMap;
 
@@ -46,7 +46,7 @@ fn random_row(rng: &mut Rng) -> TransformRow {
 fn random_frame(rng: &mut Rng, now_ns: u64) -> Frame {
     let rows: Vec<_> = (0..rng.below(8)).map(|_| random_row(rng)).collect();
     let source = ["sim", "robot"][rng.below(2)];
-    // Numbers that mostly rise.
+    // Mostly increasing numbers.
     let seq = now_ns / MS - rng.bits() % 3;
     let mut frame = frame(source, seq, now_ns - rng.bits() % (50 * MS), &rows);
     frame.received_ns = now_ns;
@@ -98,7 +98,7 @@ fn random_edit(rng: &mut Rng) -> Edit {
     }
 }
 
-/// Which bodies a listener to the change sets believes to be in the broad phase, with what it saw of them last.
+/// The bodies in the broad phase according to the change sets, with their last seen state.
 #[derive(Default)]
 struct Listener {
     inside: BTreeMap<BodySlot, (u32, [u64; 6])>,
@@ -179,6 +179,6 @@ fn whatever_comes_the_structure_holds_and_the_change_sets_tell_all() {
             );
         }
     }
-    // The test would say nothing if nothing were let through.
+    // If nearly everything were refused the test would prove nothing.
     assert!(applied > 1000 && poses > 1000, "{applied} {poses}");
 }

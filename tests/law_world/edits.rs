@@ -31,7 +31,7 @@ fn attach(name: &str, to: Option<&str>, pose: Option<Pose>) -> Edit {
     }
 }
 
-/// It was known at its old pose from then on, as young as what it hung on, and the scene clear.
+/// Afterwards it was known at its old pose, with the age of its new parent, and the state was clear.
 #[test]
 fn bug_an_attachment_where_a_body_is_needs_bodies_that_are_not_too_old() {
     let hung = BodySpec {
@@ -51,7 +51,7 @@ fn bug_an_attachment_where_a_body_is_needs_bodies_that_are_not_too_old() {
     let hang = |name, to| attach(name, to, None);
     for (silent, other) in [("sim", "robot"), ("robot", "sim")] {
         let mut bench = scene();
-        // Too old by now, which no tick has told yet.
+        // It is stale by now, but no tick has reported this yet.
         bench.send(
             TIMEOUT_NS - 2 * MS,
             other,
@@ -74,7 +74,7 @@ fn bug_an_attachment_where_a_body_is_needs_bodies_that_are_not_too_old() {
         );
         let text = bench.refused(&[hang("a", Some("b"))]);
         assert!(text.contains("wait for their frames"), "{silent}: {text}");
-        // Where somebody says where, it is known.
+        // With a given pose the body is known.
         bench.edit(attach(
             "a",
             Some("b"),
@@ -91,7 +91,8 @@ fn bug_an_attachment_where_a_body_is_needs_bodies_that_are_not_too_old() {
     );
 }
 
-/// `a`, and `c` that cannot move, hang on `b` of another source with a shorter time-out; `d` and a wall stand apart.
+/// `a`, and the fixed body `c`, are attached to `b` of another source with a shorter timeout; `d` and a wall stand
+/// apart.
 fn hung_on_another_source() -> Bench {
     let robot = BodySpec {
         source: Some(1),
@@ -116,8 +117,8 @@ fn hung_on_another_source() -> Bench {
     bench
 }
 
-/// The time-out of its own source made it known, the velocity of what it had hung on went on, and what hung on a wall
-/// was as old as the tick before.
+/// The timeout of its own source made it known, the velocity of its former parent was kept, and a body detached from a
+/// wall had the age of the last tick.
 #[test]
 fn bug_what_is_let_go_is_as_well_known_as_it_was_and_no_more_driven() {
     let scene = hung_on_another_source;
@@ -152,7 +153,7 @@ fn bug_what_is_let_go_is_as_well_known_as_it_was_and_no_more_driven() {
         BodyStatus::Stale,
         "by the time-out of the one it hung on"
     );
-    // So is what hangs on it then, and what it hangs on itself has a time-out of its own again.
+    // The same holds for a body attached to it at that time, and a body attached elsewhere has its own timeout again.
     let up = Some(Pose::translation(0.0, 0.0, 3.0));
     let mut bench = scene();
     bench.send(MS, "robot", 1, &[row(2, 5.0)]);
@@ -174,7 +175,7 @@ fn bug_what_is_let_go_is_as_well_known_as_it_was_and_no_more_driven() {
             .next_timeout()
             .is_none_or(|next_ns| next_ns > bench.now_ns)
     );
-    // What cannot move stays where it is.
+    // A fixed body keeps its pose when it is detached.
     bench.edit(attach("d", Some("c"), up));
     assert_eq!(bench.status("d"), BodyStatus::Known);
     let now_ns = bench.now_ns + 200 * TIMEOUT_NS;
@@ -199,7 +200,7 @@ fn law_3_1_remove_then_put_of_one_name_makes_a_new_generation_with_the_same_id()
         (slot, EndCause::Removed)
     );
     assert!(bench.world.body(slot).is_none() && bench.world.names_changed());
-    // Its frames find no body; the other's good rows are not lost.
+    // Rows for it find no body; valid rows for other bodies are still applied.
     let admission = bench.send(MS, "sim", 2, &[row(1, 0.0), row(2, 5.0)]);
     assert_eq!(admission, admitted(0, 1, 1));
     bench.edit(put(moving("a", 0)));
@@ -221,7 +222,7 @@ fn law_3_1_a_put_in_place_ends_the_old_pairs_and_begins_unknown() {
     assert_eq!(bench.removed("a"), Some(EndCause::Removed));
     assert_eq!(bench.body("a").generation, 2);
     assert_eq!(bench.status("a"), BodyStatus::NotReceived);
-    // One that cannot move leaves and comes back in one tick.
+    // A fixed body leaves and returns in one tick.
     bench.edit(put(fixed("wall", 2, 8.0)));
     assert_eq!(bench.removed("wall"), Some(EndCause::Removed));
     assert!(bench.inserted("wall"));
@@ -238,7 +239,7 @@ fn law_6_a_put_of_the_same_content_changes_nothing() {
     assert_eq!(bench.world.scene_rev(), rev);
     assert_eq!(bench.status("a"), BodyStatus::Known);
     assert!(!bench.world.names_changed() && !bench.world.scene_changed());
-    // After an edit in between the same words mean a change again.
+    // After an edit in between, the same put is a change again.
     bench.edit(Edit::Filter {
         name: named("a"),
         group: Some(4),
@@ -249,7 +250,7 @@ fn law_6_a_put_of_the_same_content_changes_nothing() {
     assert_eq!(bench.world.scene_rev(), rev + 2);
 }
 
-/// The words are the same, and so are box and radius: a file changed behind them.
+/// The text, box and radius are unchanged, but the content of the mesh file has changed.
 #[test]
 fn law_6_a_put_of_a_file_that_has_changed_takes_the_place_of_the_body() {
     let mesh = |last: [u32; 3]| {
@@ -310,7 +311,7 @@ fn law_6_a_request_is_done_as_a_whole_or_not_at_all() {
         }]),
         "edit 1: there is no body `arm/hnad`: did you mean `arm/hand`? If not, put the body first"
     );
-    // Within a request, what was put before is there, and what was removed is not.
+    // Within a request, a body put earlier exists, and a removed one does not.
     bench.tick_at(bench.now_ns, &[], &[]);
     let edits = [
         put(moving("b", 0)),
@@ -396,7 +397,7 @@ fn law_6_a_body_that_cannot_be_is_refused() {
         let text = bench.refused(&[put(spec.clone())]);
         assert!(text.starts_with("edit 1: body `"), "{text}");
     }
-    // Two new names in one request cannot have one id.
+    // Two new names in one request cannot have the same id.
     let text = bench.refused(&[put(moving("b", 5)), put(moving("c", 5))]);
     assert!(text.contains("belongs to `b`"), "{text}");
 }
@@ -421,7 +422,7 @@ fn law_3_5_disabling_ends_by_cause_and_enabling_brings_the_pose_that_came_meanwh
     assert!(bench.inserted("a"));
     assert_eq!(bench.body("a").pose.translation.vector.x, 3.0);
     assert!(bench.body("a").proxy.min.x > 2.0);
-    // Off for longer than its time-out it comes back as what it is.
+    // Disabled for longer than its timeout, it is stale when it is enabled again.
     bench.edit(enable(false));
     bench.wait(TIMEOUT_NS);
     bench.edit(enable(true));
@@ -445,7 +446,7 @@ fn law_3_5_bug_a_body_disabled_and_enabled_in_one_request_ended_and_began_its_co
     assert_eq!((bench.removed("a"), bench.inserted("a")), (None, false));
     assert_eq!(bench.removed("b"), Some(EndCause::Disabled));
     assert_eq!(bench.status("b"), BodyStatus::Disabled);
-    // Of one that is gone behind it, or another by then, nothing is left to be done.
+    // If a later edit of the request removes or replaces the body, nothing remains to be done for it.
     let gone = [
         enable("b", true),
         Edit::Remove { name: named("b") },
@@ -479,7 +480,7 @@ fn law_3_5_a_reset_ends_all_pairs_and_forgets_all_poses() {
     assert_eq!(bench.status("wall"), BodyStatus::Known);
 }
 
-/// What hangs on a body ends its pairs with it, also where the body comes back in the same tick.
+/// Attached bodies end their pairs together with their root, even if the root returns in the same tick.
 #[test]
 fn law_4_2_what_hangs_on_a_body_is_forgotten_with_it() {
     let tool = BodySpec {
@@ -487,7 +488,7 @@ fn law_4_2_what_hangs_on_a_body_is_forgotten_with_it() {
         pose: Pose::translation(0.0, 3.0, 0.0),
         ..moving("tool", 1)
     };
-    // The tool has the lower slot: it is looked at before what it hangs on.
+    // The tool has the lower slot, so it is processed before its parent.
     let mut bench = Bench::of(vec![tool, moving("arm", 2)]);
     bench.send(MS, "sim", 1, &[row(2, 0.0)]);
     assert_eq!(bench.status("tool"), BodyStatus::Known);
@@ -521,7 +522,7 @@ fn law_3_10_an_edit_that_enables_a_pair_asks_for_its_bodies_again() {
     assert!(bench.world.filters().allows(a, b));
     let requery = bench.world.changes().requery.clone();
     assert!(requery.contains(&a) && requery.contains(&b) && !requery.contains(&c));
-    // Both rules go, one way round or the other; what is left are the masks.
+    // Both rules are dropped, in either order of sides; only the masks remain.
     bench.edit(Edit::DropRules {
         a: named("b"),
         b: named("a"),
@@ -546,7 +547,7 @@ fn law_3_10_an_attached_body_takes_pose_age_and_unknown_from_its_parent() {
     // The scene may name the parent after the child.
     let mut bench = Bench::of(vec![held, moving("gripper", 1)]);
     assert_eq!(bench.status("held"), BodyStatus::NotReceived);
-    // Its own frames are refused.
+    // Rows for the attached body itself are refused.
     assert_eq!(
         bench.send(MS, "sim", 1, &[row(1, 3.0), row(2, 8.0)]),
         admitted(0, 1, 1)
@@ -560,7 +561,7 @@ fn law_3_10_an_attached_body_takes_pose_age_and_unknown_from_its_parent() {
     assert_eq!(bench.body("held").pose.translation.vector.x, 4.0);
     assert!(bench.world.changes().moved.contains(&bench.slot("held")));
     assert!(bench.body("held").proxy.min.x > 3.0);
-    // Refused with its parent, known again with it, old with it.
+    // It is rejected, known and stale together with its parent.
     bench.send(MS, "sim", 3, &[row(1, f64::NAN)]);
     assert_eq!(bench.status("held"), BodyStatus::Rejected);
     bench.send(MS, "sim", 4, &[row(1, 4.0)]);
@@ -584,7 +585,7 @@ fn law_3_10_a_body_is_grasped_where_it_is_and_let_go_where_it_is() {
     bench.edit(attach("box", None, None));
     assert_eq!(bench.status("box"), BodyStatus::Known);
     assert_eq!(bench.body("box").pose.translation.vector.x, 5.75);
-    // From now on its own source speaks for it, and is missed.
+    // From now on its own source moves it, and its silence makes it stale.
     bench.send(TIMEOUT_NS, "sim", 3, &[row(1, 9.0)]);
     assert_eq!(bench.body("box").pose.translation.vector.x, 5.75);
     assert_eq!(bench.status("box"), BodyStatus::Stale);
@@ -613,7 +614,7 @@ fn law_3_10_chains_hang_together_and_rings_are_refused() {
     );
     let (b, c) = (bench.slot("b"), bench.slot("c"));
     assert!(!bench.world.filters().allows(b, c), "both hang on `a`");
-    // Where it is not known where something is, it is not known where to hang it.
+    // The pose of `d` is unknown, so no relative pose can be computed.
     let text = bench.refused(&[attach("d", Some("c"), None)]);
     assert!(text.contains("say where (`position`)"), "{text}");
 }
@@ -645,7 +646,7 @@ fn a_full_scene_says_which_limit_to_raise() {
     let mut world = sweepd::world::World::new(&scene, vec![cube()], 0).unwrap();
     let text = world.apply(&[put(moving("b", 0))]).unwrap_err();
     assert!(text.contains("limits.bodies"), "{text}");
-    // In place of one that goes in the same request there is room.
+    // There is room for a new body if the same request removes one.
     let edits = [Edit::Remove { name: named("a") }, put(moving("b", 0))];
     assert!(world.apply(&edits).unwrap().changed);
     world.validate().unwrap();
@@ -717,7 +718,7 @@ fn law_6_a_body_put_again_after_a_margin_was_set_has_its_own() {
     assert_eq!(bench.world.scene_rev(), rev);
 }
 
-/// It was told to write `pose`, a key that a request has not.
+/// The message named the key `pose`, which requests do not have.
 #[test]
 fn bug_an_attachment_without_a_place_names_the_key_to_write() {
     let mut bench = Bench::of(vec![fixed("wall", 1, 9.0), moving("lamp", 2)]);
@@ -728,7 +729,7 @@ fn bug_an_attachment_without_a_place_names_the_key_to_write() {
     assert!(text.contains("leave out `position`"), "{text}");
 }
 
-/// It hangs on a body that no source moves by then, so a reset of the source has nothing to do with it.
+/// After that request no source moves the body it is attached to, so a reset of the source must not affect it.
 #[test]
 fn bug_a_body_hung_on_another_was_reset_with_the_source_that_the_same_request_took_it_from() {
     let bodies = vec![fixed("base", 1, 0.0), moving("b", 2), moving("c", 3)];

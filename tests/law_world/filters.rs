@@ -1,5 +1,5 @@
-//! Which pairs are checked (pair rules, half-spaces, report distances), against a twin that walks all
-//! rules of all pairs by name.
+//! Which pairs are checked (pair rules, half-spaces, report distances), compared with a twin that evaluates all rules
+//! of all pairs by name.
 
 use sweepd::ids::{BodySlot, PairKey};
 use sweepd::scene::{BodySpec, PairAction, PairRule, pattern_matches};
@@ -7,7 +7,7 @@ use sweepd::world::{Because, Edit, Parts, Put, World};
 
 use crate::support::{Bench, START_NS, cube, fixed, floor, moving, rule, scene};
 
-/// The order of what beats what, word for word, with no compiled structure at all.
+/// The order of precedence in its simplest form, without any compiled structure.
 fn twin(bodies: &[BodySpec], rules: &[PairRule], a: usize, b: usize) -> Because {
     let (one, other) = (&bodies[a], &bodies[b]);
     if !one.moves && !other.moves {
@@ -125,7 +125,7 @@ fn law_3_10_bodies_put_and_removed_later_are_filtered_like_those_of_the_scene() 
         rule(PairAction::Check, "arm_1_7", "wall_2"),
         rule(PairAction::Ignore, "arm_0_0", "arm_2_2"),
     ];
-    // Every second body comes later, in another order, some twice.
+    // Every second body is put later, in another order, and some are put twice.
     let first: Vec<_> = bodies.iter().step_by(2).cloned().collect();
     let mut bench = Bench::with_rules(Vec::new(), rules.clone());
     let put = |body: &BodySpec| {
@@ -154,7 +154,7 @@ fn law_3_10_bodies_put_and_removed_later_are_filtered_like_those_of_the_scene() 
 
 #[test]
 fn law_3_10_thousands_of_rules_by_name_are_no_burden() {
-    // What a simulator's scene of 200 bodies brings along: every fourth pair excluded by name.
+    // As in a simulator's scene of 200 bodies: every fourth pair is excluded by name.
     let bodies: Vec<_> = (0..200)
         .map(|k| moving(&format!("geom_{k}"), k + 1))
         .collect();
@@ -206,7 +206,7 @@ fn bug_two_bodies_with_half_spaces_were_no_pair_though_they_had_other_shapes() {
     assert_eq!(decide("a", "floor"), Because::Masks);
     assert_eq!(decide("ramp", "floor"), Because::HalfSpaces);
     free.validate().unwrap();
-    // All pairs but that of the two half-spaces are ignored.
+    // All pairs are ignored, except for that of the two half-spaces, which does not count.
     assert_eq!(world(rules).ignored_pairs_count(), 9);
 }
 
@@ -234,9 +234,9 @@ fn law_3_4_a_rule_overrides_the_larger_of_the_two_report_distances() {
     assert_eq!(bench.world.report_within(a, b), 0.3);
     assert_eq!(bench.world.report_within(c, a), 5.0);
     assert_eq!(bench.world.report_within(b, c), 0.2);
-    // Only the pair whose boxes are not wide enough is forced.
+    // Only the pair whose boxes are not enlarged far enough is forced.
     assert_eq!(bench.world.filters().forced_pairs(), [PairKey::new(a, c)]);
-    // A later rule decides alone.
+    // The last matching rule alone applies.
     bench.edit(Edit::Rule(rule(PairAction::Ignore, "a", "*")));
     assert!(bench.world.filters().forced_pairs().is_empty());
     assert!(bench.world.scene_changed());
@@ -253,7 +253,7 @@ fn law_3_4_a_rule_of_very_many_pairs_widens_their_boxes_instead() {
     assert!(bench.world.filters().forced_pairs().is_empty());
     let rows = [crate::support::row(1, 0.0), crate::support::row(2, 3.9)];
     bench.send(1, "sim", 1, &rows);
-    // 2.9 m of air, reported within 3 m: their boxes meet.
+    // The gap is 2.9 m and the report distance 3 m: the boxes overlap.
     let (one, other) = (bench.body("b0"), bench.body("b1"));
     assert!(one.proxy.overlaps(&other.proxy));
     bench.edit(Edit::DropRules {

@@ -10,7 +10,7 @@ const WAITING: Admission = Admission::Waiting {
     source: SourceSlot(0),
 };
 
-/// A tick `after_ns` later with one frame of `sim`, changed by `change`.
+/// Runs a tick `after_ns` later with one frame of `sim`, changed by `change`.
 fn send(
     bench: &mut Bench,
     after_ns: u64,
@@ -36,7 +36,7 @@ fn partial(scene_rev: u64) -> impl FnOnce(&mut Frame) {
     }
 }
 
-/// The scene has come to its next revision.
+/// Brings the scene to its next revision.
 fn revise(bench: &mut Bench, name: &str) {
     bench.edit(Edit::Put(Put {
         body: std::sync::Arc::new(fixed(name, 0, 99.0)),
@@ -67,9 +67,9 @@ fn bug_a_pause_threw_away_the_poses_that_waited_and_renewed_those_before_them() 
         (x(&bench, "a"), bench.status("a")),
         (3.0, BodyStatus::Known)
     );
-    // What was told last stays what it is.
+    // The published row keeps the last sequence number.
     assert_eq!(bench.world.sources()[0].to_row(bench.now_ns).seq, 5);
-    // From here on a pause speaks of them.
+    // From here on pauses renew these poses.
     for seq in 6..16 {
         pause(&mut bench, 200 * MS, seq);
         assert_eq!(bench.status("a"), BodyStatus::Known);
@@ -107,7 +107,7 @@ fn bug_a_pause_renewed_poses_that_newer_ones_had_followed_which_were_never_taken
         bench.wait((since_ns + TIMEOUT_NS).saturating_sub(bench.now_ns));
         assert_eq!(bench.status("a"), BodyStatus::Stale, "{nth}");
         assert!(bench.world.sources()[0].alive());
-        // Until the next pose frame.
+        // The next pose frame ends this.
         bench.send(MS, "sim", 8, &[row(1, 4.0)]);
         for seq in 9..12 {
             pause(&mut bench, 400 * MS, seq);
@@ -134,7 +134,7 @@ fn bug_a_frame_was_refused_before_its_time_out_with_the_one_before_it() {
     );
 }
 
-/// What is missing is older than the poses that are taken at last, or newer.
+/// The lost frames are older than the poses applied last, or newer.
 #[test]
 fn a_pause_speaks_of_poses_that_waited_unless_newer_ones_were_lost() {
     for (lost_before, lost_after) in [(false, false), (true, false), (false, true), (true, true)] {
@@ -148,7 +148,7 @@ fn a_pause_speaks_of_poses_that_waited_unless_newer_ones_were_lost() {
         revise(&mut bench, "wall");
         assert_eq!(x(&bench, "a"), 3.0);
         for seq in first + 1..first + 6 {
-            // It needs nothing of the scene, whatever it says.
+            // A pause needs no scene revision, whatever its header says.
             send(&mut bench, 200 * MS, (seq, &[]), |f| {
                 f.header.flags = frame_flags::PAUSED;
                 f.header.scene_rev = 77;
@@ -168,7 +168,7 @@ fn bug_a_frame_that_is_too_old_threw_away_what_waited() {
     send(&mut bench, MS, (2, &[row(1, 4.0)]), of_the_past);
     revise(&mut bench, "wall");
     assert_eq!(x(&bench, "a"), 3.0);
-    // Its sender has said others since.
+    // The sender has sent other poses since.
     let since_ns = bench.now_ns;
     for seq in 3..6 {
         pause(&mut bench, 100 * MS, seq);
@@ -185,7 +185,8 @@ fn bug_a_partial_frame_that_waited_was_passed_over_for_the_next() {
         send(&mut bench, MS, (2, &[row(1, 1.0)]), partial(2)),
         WAITING
     );
-    // They come behind it, whatever they need themselves: the newest pose of a body is to be the last.
+    // They queue behind the waiting frame regardless of their own revisions: the newest pose of a body must be applied
+    // last.
     for (seq, own, rev) in [
         (3, row(2, 8.0), 0),
         (4, row(1, 2.0), 2),
@@ -197,7 +198,7 @@ fn bug_a_partial_frame_that_waited_was_passed_over_for_the_next() {
     revise(&mut bench, "wall");
     assert_eq!((x(&bench, "a"), x(&bench, "b")), (2.0, 8.0));
     assert_eq!(bench.world.sources()[0].to_row(bench.now_ns).seq, 4);
-    // The last waits for a time-out of its own.
+    // The last frame waits with its own timeout.
     bench.wait(TIMEOUT_NS - 2 * MS);
     assert_eq!(bench.rejects(RejectReason::SceneRevision), 0);
     revise(&mut bench, "other");

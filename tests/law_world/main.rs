@@ -1,5 +1,5 @@
-//! Goal: each rule of the contract (`msgs/README.md`) that the world keeps, with the counter-example that it must
-//! withstand. Method: a world of cubes is fed frames and edits by hand; its structure is checked after every tick.
+//! Goal: each rule of the contract (`msgs/README.md`) that the world implements, with the counter-example for it.
+//! Method: a world of cubes is fed frames and edits by hand; its structure is validated after every tick.
 #![allow(
     clippy::unwrap_used,
     clippy::float_cmp,

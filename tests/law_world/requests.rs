@@ -1,4 +1,4 @@
-//! Requests of several edits: each finds the scene as those before it made it.
+//! Requests with several edits: each edit sees the scene as the earlier ones leave it.
 
 use std::sync::Arc;
 
@@ -47,7 +47,7 @@ fn hung(name: &str, to: &str, at_x: f64) -> BodySpec {
     }
 }
 
-/// A tick with one request.
+/// Runs a tick with one request.
 fn request(bench: &mut Bench, edits: &[Edit]) {
     bench.tick += 1;
     bench.world.begin_tick(bench.tick, bench.now_ns);
@@ -60,7 +60,7 @@ fn x_of(bench: &Bench, name: &str) -> f64 {
     bench.body(name).pose.translation.vector.x
 }
 
-/// `x` at 5 and `z` at 6.5, both sent; a floor at 0.
+/// `x` at 5 m and `z` at 6.5 m, both received; a floor at 0.
 fn grasp() -> Bench {
     let mut bench = Bench::of(vec![moving("x", 1), moving("z", 2), fixed("floor", 3, 0.0)]);
     bench.send(MS, "sim", 1, &[row(1, 5.0), row(2, 6.5)]);
@@ -74,12 +74,12 @@ fn bug_an_id_that_a_request_asks_for_was_given_to_another_name_of_it() {
     assert_eq!(bench.body("p").id, BodyId(6));
     assert_eq!(bench.body("q").id, BodyId(5));
     assert_eq!(bench.world.bodies().count(), 6);
-    // One name that asks late has what it asks for, and no two ids.
+    // A name that asks for an id only in its second put gets this id, and no other.
     request(&mut bench, &[put(moving("r", 0)), put(moving("r", 9))]);
     assert_eq!(bench.body("r").id, BodyId(9));
     let text = bench.refused(&[put(moving("s", 7)), put(moving("s", 8))]);
     assert!(text.contains("has the id 7"), "{text}");
-    // It stays with the name, also where its body goes again.
+    // The id stays with the name, even if its body is removed again.
     let text = bench.refused(&[put(moving("s", 7)), remove("s"), put(moving("t", 7))]);
     assert!(text.contains("belongs to `s`"), "{text}");
 }
@@ -90,7 +90,7 @@ fn bug_a_body_hung_where_it_is_moved_where_the_request_moves_what_it_hangs_on() 
     let edits = [attach("x", "floor", Some(0.0)), attach("z", "x", None)];
     request(&mut bench, &edits);
     assert_eq!((x_of(&bench, "x"), x_of(&bench, "z")), (0.0, 6.5));
-    // As two requests: what hangs on a body goes with it, and is let go where that was.
+    // As with two requests: an attached body moves with its parent, and is detached at the resulting pose.
     let mut bench = grasp();
     let edits = [
         attach("z", "x", None),
@@ -100,12 +100,12 @@ fn bug_a_body_hung_where_it_is_moved_where_the_request_moves_what_it_hangs_on() 
     request(&mut bench, &edits);
     assert_eq!((x_of(&bench, "x"), x_of(&bench, "z")), (0.0, 1.5));
     assert_eq!(bench.status("z"), BodyStatus::Known);
-    // Also at the start pose of one that is put in place of it.
+    // This includes the start pose of a body that replaces the parent.
     let mut bench = grasp();
     bench.edit(attach("z", "x", None));
     request(&mut bench, &[put(fixed("x", 1, 2.0)), detach("z")]);
     assert_eq!((x_of(&bench, "x"), x_of(&bench, "z")), (2.0, 3.5));
-    // And of one that the request has put there.
+    // And a body that the request itself has attached.
     let lamp = BodySpec {
         attached_to: Some("x".to_owned()),
         ..fixed("lamp", 0, 1.0)
@@ -114,7 +114,7 @@ fn bug_a_body_hung_where_it_is_moved_where_the_request_moves_what_it_hangs_on() 
     request(&mut bench, &[put(lamp), detach("lamp"), reset]);
     assert_eq!(x_of(&bench, "lamp"), 3.0);
     assert_eq!(bench.status("lamp"), BodyStatus::Known);
-    // Where what it hung on is removed it stays where it was.
+    // If the parent is removed, the body stays where it was.
     let mut bench = grasp();
     bench.edit(attach("z", "x", None));
     let edits = [remove("x"), attach("z", "floor", None)];
@@ -136,7 +136,7 @@ fn bug_a_start_pose_that_was_never_received_became_an_offset() {
         text.starts_with("edit 2: it is not known where `x`"),
         "{text}"
     );
-    // Nor does one that the request forgets.
+    // The same holds for a body whose pose the request has reset.
     let reset = Edit::Reset { source: None };
     let text = bench.refused(&[reset, attach("x", "floor", None)]);
     assert!(
@@ -164,7 +164,7 @@ fn bug_edits_were_held_against_the_bodies_of_before_the_request() {
     };
     let text = bench.refused(&[put(lost()), detach("g")]);
     assert!(text.contains("no source may move it"), "{text}");
-    // And the other way round: what takes their place can.
+    // The other way round: a body that replaces it can be detached.
     bench.edit(put(lost()));
     request(&mut bench, &[put(hung("g", "x", 2.0)), detach("g")]);
     assert_eq!(x_of(&bench, "g"), 7.0);
@@ -197,7 +197,7 @@ fn bug_a_put_after_edits_that_changed_nothing_made_a_new_generation() {
     bench.edit(put(moving("x", 1)));
     assert_eq!(bench.world.scene_rev(), rev);
     assert_eq!(bench.body("x").generation, 1);
-    // One that cannot move is as it was put where it was put.
+    // A fixed body is at the pose it is put with.
     bench.edit(attach("floor", "x", Some(1.0)));
     bench.edit(detach("floor"));
     bench.edit(put(fixed("floor", 3, 0.0)));
@@ -212,14 +212,14 @@ fn bug_names_kept_the_source_of_a_body_that_was_hung_or_let_go() {
         bench.edit(edit);
         assert!(bench.world.names_changed());
     }
-    // Its source is the same.
+    // Its source is still the same.
     for edit in [attach("z", "x", None), detach("z")] {
         bench.edit(edit);
         assert!(!bench.world.names_changed());
     }
 }
 
-/// Looked at link by link from each end, this would take minutes.
+/// Walking the chain from each of its ends would take minutes.
 #[test]
 fn bug_a_long_chain_in_one_request_was_walked_from_each_of_its_bodies() {
     const LEN: u64 = 20_000;
@@ -233,7 +233,7 @@ fn bug_a_long_chain_in_one_request_was_walked_from_each_of_its_bodies() {
     request(&mut bench, &edits);
     let last = name(LEN);
     assert_eq!(x_of(&bench, &last), 5.0 + 0.25 * LEN as f64);
-    // Let go and hung again where they are, from the first on, then taken out.
+    // Each link is detached and attached again at its pose, from the first on; then they are removed.
     edits = vec![attach("z", "floor", Some(1.0))];
     edits.extend(
         (1..=LEN).flat_map(|at| [detach(&name(at)), attach(&name(at), &name(at - 1), None)]),
@@ -245,7 +245,7 @@ fn bug_a_long_chain_in_one_request_was_walked_from_each_of_its_bodies() {
     assert_eq!(bench.world.bodies().count(), 3);
 }
 
-/// The same from the far end, with a place and without one that was ever received.
+/// The same from the far end, with a known root and with one that was never received.
 #[test]
 fn bug_a_long_chain_that_is_let_go_from_its_end_was_walked_from_each_of_its_bodies() {
     const LEN: u64 = 20_000;
@@ -264,7 +264,7 @@ fn bug_a_long_chain_that_is_let_go_from_its_end_was_walked_from_each_of_its_bodi
         let edits: Vec<Edit> = (1..=LEN).rev().map(|at| detach(&name(at))).collect();
         request(&mut bench, &edits);
         assert_eq!((x_of(&bench, &last), bench.status(&last)), (was_x, status));
-        // Hung and let go once more where something has moved.
+        // Attached and detached once more after something has moved.
         let mut edits: Vec<Edit> = (1..=LEN)
             .map(|at| attach(&name(at), &name(at - 1), Some(0.5)))
             .collect();
@@ -299,7 +299,7 @@ fn bug_a_chain_of_bodies_that_cannot_move_was_walked_from_each_that_is_let_go() 
                 to: None,
                 pose: Some(Pose::translation(at as f64, 0.0, 0.0)),
             });
-            // Something else is hung in between.
+            // Another body is attached in between.
             edits.push(attach("z", "x", Some(1.0)));
         }
         request(&mut bench, &edits);
@@ -335,7 +335,7 @@ fn bug_a_body_let_go_by_the_request_that_hung_it_on_an_unknown_one_stayed_known(
     assert_eq!(one.status("b"), BodyStatus::NotReceived);
     assert_eq!((x_of(&one, "b"), x_of(&two, "b")), (3.0, 3.0));
     assert!(one.removed("b").is_some());
-    // As old as what it hung on.
+    // As old as its former parent.
     let stale = || {
         let mut bench = Bench::of(vec![moving("a", 1), moving("b", 2)]);
         bench.send(MS, "sim", 1, &[row(1, 1.0)]);
@@ -372,7 +372,7 @@ fn bug_a_put_was_held_against_the_body_of_before_the_request() {
         report_within_m,
     };
     let was = moving("b", 1).group;
-    // What differs by now is put anew, and its start pose counts.
+    // A body that differs by now is replaced, and its start pose applies.
     for before in [
         vec![filter(2)],
         vec![enable(false)],
@@ -386,7 +386,7 @@ fn bug_a_put_was_held_against_the_body_of_before_the_request() {
         assert_eq!(bench.body("b").generation, 2);
         assert_eq!(x_of(&bench, "c"), 4.0);
     }
-    // What is the same by now is not, and was never received.
+    // A body that is the same by now is not replaced, and it was never received.
     for before in [
         vec![],
         vec![filter(2), filter(was)],

@@ -1,4 +1,4 @@
-//! Pair rules of long requests, against requests of one edit each and against a walk over all pairs.
+//! Pair rules in long requests, compared with requests of one edit each and with a walk over all pairs.
 
 use std::sync::Arc;
 
@@ -44,7 +44,7 @@ fn put(body: BodySpec) -> Edit {
     })
 }
 
-/// How many pairs the filters ignore, one by one.
+/// The number of pairs that the filters ignore, counted one by one.
 fn walk(world: &World) -> u64 {
     let slots: Vec<_> = world.bodies().map(|(slot, _)| slot).collect();
     let pairs = slots.iter().enumerate().flat_map(|(at, a)| {
@@ -78,7 +78,7 @@ fn bug_rules_of_one_request_mean_what_they_mean_one_by_one() {
                 }
                 _ => Edit::Rule(random.rule()),
             };
-            // What is refused alone has no place in the request.
+            // An edit that is refused alone is omitted from the request.
             if single.world.apply(std::slice::from_ref(&edit)).is_ok() {
                 request.push(edit);
             }
@@ -156,7 +156,7 @@ fn bug_the_count_of_ignored_pairs_is_that_of_a_walk_over_all_pairs() {
     }
 }
 
-/// A request with as many rules as bodies, and one body enabled among many attached pairs.
+/// A request with as many rules as bodies, and one body enabled among many pairs of attached bodies.
 #[test]
 #[ignore = "timing; SWEEPD_CI_SLOW=1 .ci/run runs it"]
 #[allow(clippy::disallowed_methods, reason = "a timing")]
@@ -195,8 +195,9 @@ fn long_requests_of_rules_and_many_groups_take_no_longer_than_reading_them() {
     assert!(took.as_millis() < 1000);
 }
 
-/// What a pattern matches is kept for each rule: beyond a bound a request is refused whole, whether it brings rules or
-/// names, and a scene is too. Before, one that fitted into a message could hold the daemon up for minutes.
+/// The matches of a pattern are stored for each rule. Beyond a limit a request is refused as a whole, whether it adds
+/// rules or names, and so is a scene. Without the limit a request that fits in a message could block the daemon for
+/// minutes.
 #[test]
 fn bug_what_pair_rules_with_patterns_match_was_without_bound() {
     const NAMES: u64 = 3000;
@@ -205,7 +206,7 @@ fn bug_what_pair_rules_with_patterns_match_was_without_bound() {
     let edits = |count: u64| rules(count).map(Edit::Rule).collect::<Vec<_>>();
     let bodies = || -> Vec<BodySpec> { (1..=NAMES).map(|k| moving(&format!("b{k}"), k)).collect() };
     let mut world = Bench::with_rules(bodies(), Vec::new()).world;
-    // Each matches every name once, and one of them twice.
+    // Each rule matches every name once, and one name twice.
     let most = PATTERN_MATCHES_MAX as u64 / (NAMES + 1);
     let rev = world.scene_rev();
     let why = world.apply(&edits(most + 1)).unwrap_err();
@@ -214,9 +215,9 @@ fn bug_what_pair_rules_with_patterns_match_was_without_bound() {
     let mut steps = 0;
     let applied = world.apply_stepwise(&edits(most), &mut || steps += 1);
     assert!(applied.unwrap().changed);
-    // Each is looked at, counted, applied and compiled.
+    // Each rule takes four steps: check, count, apply, compile.
     assert_eq!(steps, 4 * most);
-    // There is room for one more name of all of these.
+    // There is room for one more name that all these rules match.
     let more = |k: u64| put(moving(&format!("more{k}"), 0));
     assert!(
         world
@@ -226,7 +227,7 @@ fn bug_what_pair_rules_with_patterns_match_was_without_bound() {
     );
     world.apply(&[more(1)]).unwrap();
     assert!(world.apply(&[more(2)]).unwrap_err().contains("fewer rules"));
-    // The same request may give up some of them.
+    // The same request may drop some of these rules.
     let drop = |k: u64| Edit::DropRules {
         a: "*".to_owned(),
         b: format!("b{k}"),

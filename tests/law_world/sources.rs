@@ -16,7 +16,7 @@ fn of_session(session: u64, frame: Frame) -> Frame {
     frame
 }
 
-/// A frame of the source `sim` that has just come, changed by `change`.
+/// Sends a frame of source `sim`, received just now and changed by `change`.
 fn send_with(bench: &mut Bench, after_ns: u64, change: impl FnOnce(&mut Frame)) -> Admission {
     let now_ns = bench.now_ns + after_ns;
     let mut frame = frame("sim", 1, now_ns, &[row(1, 0.0)]);
@@ -47,10 +47,10 @@ fn law_4_1_a_frame_that_does_not_fit_is_refused_as_a_whole_and_counted() {
     let nobody = |f: &mut Frame| f.header.source = name_bytes("nobody");
     assert_eq!(wrong(&nobody), RejectReason::UnknownSource);
     assert_eq!(bench.rejects(bad), 7);
-    // Where a frame says whose it is, it is that source's.
+    // A refused frame counts for the source that it names.
     assert_eq!(bench.world.sources()[0].to_row(0).refused, 7);
     assert_eq!(bench.status("a"), BodyStatus::NotReceived);
-    // None of it stands in the way of a good one, and none opened a session.
+    // Refused frames do not affect a valid one, and none of them opened a session.
     assert_eq!(send_with(&mut bench, MS, |_| {}), admitted(0, 1, 0));
     assert_eq!(bench.world.sources()[0].session, 1);
 }
@@ -63,7 +63,7 @@ fn bug_ids_of_another_run_of_the_daemon_moved_other_bodies() {
     let over = refused(0, RejectReason::SessionOver);
     assert_eq!(send_with(&mut bench, MS, of_boot(8)), over);
     assert_eq!(bench.status("a"), BodyStatus::NotReceived);
-    // It ends no session: the client may go on with the new names. Who does not say is believed.
+    // It ends no session: the client may continue with the new names. A frame without a boot id is accepted.
     assert_eq!(send_with(&mut bench, MS, of_boot(7)), admitted(0, 1, 0));
     assert_eq!(
         send_with(&mut bench, MS, |f| {
@@ -79,7 +79,7 @@ fn law_4_2_two_clients_of_one_source_the_second_is_refused_and_counted() {
     let mut bench = Bench::of(vec![moving("a", 1)]);
     bench.send(MS, "sim", 1, &[row(1, 0.0)]);
     for k in 0..5 {
-        // Both send; the owner's poses stand.
+        // Both sessions send; only the poses of the owner apply.
         bench.send(MS, "sim", 2 + k, &[row(1, 1.0)]);
         let second = of_session(2, frame("sim", 100 + k, bench.now_ns, &[row(1, 9.0)]));
         let admission = bench.tick_at(bench.now_ns, &[], &[second])[0];
@@ -95,7 +95,8 @@ fn law_4_2_two_clients_of_one_source_the_second_is_refused_and_counted() {
 fn law_4_2_a_stopped_owner_loses_its_source_and_is_refused_for_this_boot() {
     let mut bench = Bench::of(vec![moving("a", 1), moving("b", 2)]);
     bench.send(MS, "sim", 50, &[row(1, 0.0), row(2, 5.0)]);
-    // SIGSTOP. Just before its time-out another is refused, at the time-out it is not.
+    // The owner is stopped (SIGSTOP). Just before its timeout another session is refused; at the timeout it is
+    // accepted.
     let now_ns = bench.now_ns + TIMEOUT_NS - MS;
     let early = of_session(2, frame("sim", 1, now_ns, &[row(1, 1.0)]));
     assert_eq!(
@@ -103,15 +104,15 @@ fn law_4_2_a_stopped_owner_loses_its_source_and_is_refused_for_this_boot() {
         refused(0, RejectReason::SourceTaken)
     );
     let now_ns = now_ns + MS;
-    // The client that restarted counts from 1 again.
+    // The restarted client numbers its frames from 1 again.
     let next = of_session(2, frame("sim", 1, now_ns, &[row(1, 1.0)]));
     assert_eq!(bench.tick_at(now_ns, &[], &[next])[0], admitted(0, 1, 0));
-    // All pairs of the source's bodies end, and what the new session has not said is not known.
+    // All pairs of the source's bodies end, and bodies that the new session has not sent are unknown.
     assert_eq!(bench.removed("a"), Some(EndCause::Reset));
     assert_eq!(bench.removed("b"), Some(EndCause::Reset));
     assert!(bench.inserted("a") && !bench.inserted("b"));
     assert_eq!(bench.status("b"), BodyStatus::NotReceived);
-    // SIGCONT: it sends as if nothing had happened, now and long after the new owner has died.
+    // The owner continues (SIGCONT): its frames are refused, even long after the new owner has gone.
     for after_ns in [MS, 10 * TIMEOUT_NS] {
         let old = bench.send(after_ns, "sim", 51, &[row(1, 7.0)]);
         assert_eq!(old, refused(0, RejectReason::SessionOver));
@@ -125,7 +126,7 @@ fn law_4_2_a_dead_node_frees_its_source_at_once() {
     let mut bench = Bench::of(vec![moving("a", 1)]);
     bench.send(MS, "sim", 7, &[row(1, 0.0)]);
     bench.world.end_session(1);
-    // Its death alone says nothing about its bodies: they age.
+    // The end of the session alone does not affect its bodies; they age.
     bench.wait(MS);
     assert_eq!(bench.status("a"), BodyStatus::Known);
     let next = of_session(2, frame("sim", 1, bench.now_ns, &[row(1, 1.0)]));
@@ -134,7 +135,7 @@ fn law_4_2_a_dead_node_frees_its_source_at_once() {
     assert_eq!(bench.removed("a"), Some(EndCause::Reset));
     let ghost = bench.send(MS, "sim", 8, &[row(1, 0.0)]);
     assert_eq!(ghost, refused(0, RejectReason::SessionOver));
-    // A session that is not in force changes nothing.
+    // The end of a session that is not in force changes nothing.
     bench.world.end_session(1);
     assert_eq!(bench.world.sources()[0].session, 2);
     bench.world.end_session(2);
@@ -151,7 +152,7 @@ fn law_4_2_frames_from_the_past_are_refused() {
     }
     assert_eq!(bench.body("a").pose.translation.vector.x, 1.0);
     assert_eq!(bench.rejects(RejectReason::OldFrame), 3);
-    // Frames may be missing.
+    // Missing frames are allowed.
     assert_eq!(bench.send(MS, "sim", 9, &[row(1, 2.0)]), admitted(0, 1, 0));
 }
 
@@ -160,7 +161,7 @@ fn law_4_2_a_raised_epoch_ends_the_pairs_and_forgets_the_poses() {
     let mut bench = Bench::of(vec![moving("a", 1), moving("b", 2), fixed("wall", 3, 9.0)]);
     bench.send(MS, "sim", 5, &[row(1, 0.0), row(2, 5.0)]);
     let raised = |f: &mut Frame| f.header.epoch = 1;
-    // Reset, then a partial frame: bodies that are not in it stay not received.
+    // A new epoch with a partial frame: bodies that it does not contain stay not received.
     let admission = send_with(&mut bench, MS, |f| {
         raised(f);
         f.header.flags = frame_flags::PARTIAL;
@@ -175,7 +176,7 @@ fn law_4_2_a_raised_epoch_ends_the_pairs_and_forgets_the_poses() {
         assert_eq!(bench.status("b"), BodyStatus::NotReceived);
         assert!(!bench.body("b").in_broad);
     }
-    // The old epoch is the past, however high its numbers.
+    // Frames of the old epoch are refused, however high their numbers.
     let old = bench.send(MS, "sim", 1000, &[row(1, 1.0)]);
     assert_eq!(old, refused(0, RejectReason::OldFrame));
 }
@@ -199,7 +200,7 @@ fn law_4_3_a_body_absent_from_its_own_full_frames_is_unknown_at_the_time_out() {
     bench.send(MS, "sim", 1, &[row(1, 0.0), row(2, 5.0)]);
     let last_ns = bench.now_ns;
     for seq in 2..60 {
-        // Whatever else arrives: frames of its source without it, and a stranger that claims it.
+        // Frames of its own source without it, and rows for it from another source, do not renew it.
         let now_ns = last_ns + (seq - 1) * 10 * MS;
         let own = frame("sim", seq, now_ns, &[row(1, 0.0)]);
         let other = frame("robot", seq, now_ns, &[row(2, 5.0)]);
@@ -251,7 +252,7 @@ fn law_4_3_a_paused_frame_renews_what_was_in_the_last_pose_frame_for_one_time_ou
     assert_eq!(bench.status("a"), BodyStatus::Known);
     bench.wait(1);
     assert_eq!(bench.status("a"), BodyStatus::Stale);
-    // It renews, it does not forgive: a refused pose stays refused.
+    // A pause renews poses, but does not make a rejected pose valid.
     let bad = TransformRow {
         position: [f64::NAN; 3],
         ..row(1, 0.0)
@@ -298,7 +299,7 @@ fn law_4_3_a_frame_for_a_revision_that_does_not_come_is_refused_after_one_time_o
 fn bug_a_stream_for_a_revision_that_does_not_come_is_refused_each_time_out() {
     let mut bench = Bench::of(vec![moving("a", 1)]);
     let mut waits = 0;
-    // 50 Hz for two time-outs and a bit: far more often than a wait is long.
+    // At 50 Hz for slightly more than two timeouts: far more frames than there are timeouts.
     for seq in 1..=52 {
         let now_ns = bench.now_ns + 20 * MS;
         let mut next = frame("sim", seq, now_ns, &[row(1, 0.0)]);
@@ -309,7 +310,7 @@ fn bug_a_stream_for_a_revision_that_does_not_come_is_refused_each_time_out() {
     assert_eq!(waits, 52);
     assert_eq!(bench.rejects(RejectReason::SceneRevision), 2);
     assert_eq!(bench.status("a"), BodyStatus::NotReceived);
-    // A new epoch waits anew.
+    // A frame of a new epoch starts a new wait.
     let now_ns = bench.now_ns + MS;
     let mut next = frame("sim", 1, now_ns, &[row(1, 0.0)]);
     next.header.epoch = 1;
@@ -374,7 +375,7 @@ fn law_4_8_stamps_are_carried_and_never_trusted() {
         f.header.stamp_ns = u64::MAX;
         f.header.clock_id = 7;
     });
-    // A stamp from the end of time ages no slower.
+    // A stamp far in the future does not slow down ageing.
     assert_eq!(bench.body("a").stamp_ns, u64::MAX);
     assert_eq!(bench.world.sources()[0].to_row(bench.now_ns).clock_id, 7);
     let (oldest_ns, newest_ns) = bench.world.stamps();
@@ -390,7 +391,7 @@ fn rows_in_any_order_and_number_find_their_bodies() {
     let mut bench = Bench::of(bodies);
     let mut seed = 7_u64;
     for seq in 1..200 {
-        // A new selection and order each time, so that the guess by place is mostly wrong.
+        // A new selection and order each time, so that the guess of the slot by position is mostly wrong.
         let mut ids: Vec<u64> = (1..=40).collect();
         for at in (1..ids.len()).rev() {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -407,7 +408,7 @@ fn rows_in_any_order_and_number_find_their_bodies() {
     }
 }
 
-/// Vertices may be the first that is heard of a new epoch.
+/// Vertices may be the first messages of a new epoch.
 #[test]
 fn bug_a_frame_that_waits_is_void_once_vertices_of_a_later_epoch_have_come() {
     let mut bench = Bench::of(vec![moving("a", 1)]);

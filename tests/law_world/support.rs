@@ -1,4 +1,4 @@
-//! Scenes of 1 m cubes, frames, and a world that checks itself after every step.
+//! Scenes of 1 m cubes, frames, and a world that validates itself after every step.
 
 #![allow(dead_code, reason = "two test crates include this file")]
 
@@ -15,12 +15,12 @@ use sweepd::wire::{
 use sweepd::world::{Admission, Body, Edit, Parts, PlacedShape, World};
 
 pub(crate) const MS: u64 = 1_000_000;
-/// The time-out of every source here.
+/// Timeout of every source in these tests.
 pub(crate) const TIMEOUT_NS: u64 = 500 * MS;
-/// When the daemon starts.
+/// Start time of the daemon.
 pub(crate) const START_NS: u64 = 10_000 * MS;
 
-/// A cube of 1 m, centred.
+/// A centred cube of side 1 m.
 pub(crate) fn cube() -> Parts {
     let corner = |k: usize| {
         let at = |bit: usize| if k & bit == 0 { -0.5 } else { 0.5 };
@@ -53,7 +53,7 @@ pub(crate) fn cube() -> Parts {
     }])
 }
 
-/// A sheet that deforms.
+/// An edit that puts a deforming sheet.
 pub(crate) fn cloth() -> Edit {
     let mesh = ShapeSpec::Trimesh {
         vertices: vec![
@@ -104,7 +104,7 @@ pub(crate) fn floor() -> Parts {
     }])
 }
 
-/// A body that moves, of the first source.
+/// A moving body of the first source.
 pub(crate) fn moving(name: &str, id: u64) -> BodySpec {
     let shape = ShapeSpec::Box {
         half_extents: [0.5; 3],
@@ -119,7 +119,7 @@ pub(crate) fn moving(name: &str, id: u64) -> BodySpec {
     }
 }
 
-/// A body that cannot move, at `x` metres.
+/// A fixed body at `x` metres.
 pub(crate) fn fixed(name: &str, id: u64, x: f64) -> BodySpec {
     BodySpec {
         moves: false,
@@ -139,7 +139,7 @@ pub(crate) fn rule(action: PairAction, a: &str, b: &str) -> PairRule {
     }
 }
 
-/// A scene of two sources, `sim` and `robot`.
+/// A scene with two sources, `sim` and `robot`.
 pub(crate) fn scene(bodies: Vec<BodySpec>, rules: Vec<PairRule>) -> Scene {
     let source = |name: &str| SourceSpec {
         name: name.to_owned(),
@@ -167,7 +167,7 @@ pub(crate) fn row(body: u64, x: f64) -> TransformRow {
     }
 }
 
-/// A full frame of session 1 of `source`, sent at `at_ns`.
+/// A full frame of `source` in session 1, sent at `at_ns`.
 pub(crate) fn frame(source: &str, seq: u64, at_ns: u64, rows: &[TransformRow]) -> Frame {
     let mut frame = Frame::default();
     frame.header.schema = WIRE_VERSION;
@@ -182,7 +182,7 @@ pub(crate) fn frame(source: &str, seq: u64, at_ns: u64, rows: &[TransformRow]) -
     frame
 }
 
-/// A world and its time; every step is followed by a full check of the structure.
+/// A world and its time; the structure is validated after every step.
 pub(crate) struct Bench {
     pub(crate) world: World,
     pub(crate) now_ns: u64,
@@ -210,7 +210,7 @@ impl Bench {
         bench
     }
 
-    /// One tick: edits (one request each), frames, ages; then the structure is checked.
+    /// Runs one tick: edits (one request each), frames, ages; then validates the structure.
     pub(crate) fn tick_at(
         &mut self,
         now_ns: u64,
@@ -230,7 +230,7 @@ impl Bench {
         admissions
     }
 
-    /// A tick `after_ns` later with one frame that has just come.
+    /// Runs a tick `after_ns` later with one frame received just now.
     pub(crate) fn send(
         &mut self,
         after_ns: u64,
@@ -242,17 +242,17 @@ impl Bench {
         self.tick_at(now_ns, &[], &[frame(source, seq, now_ns, rows)])[0]
     }
 
-    /// A tick `after_ns` later with nothing new.
+    /// Runs a tick `after_ns` later without input.
     pub(crate) fn wait(&mut self, after_ns: u64) {
         self.tick_at(self.now_ns + after_ns, &[], &[]);
     }
 
-    /// A tick at once with one edit.
+    /// Runs a tick with one edit, at the current time.
     pub(crate) fn edit(&mut self, edit: Edit) {
         self.tick_at(self.now_ns, &[edit], &[]);
     }
 
-    /// What a refused request says; nothing may have changed.
+    /// The error of a refused request; asserts that nothing has changed.
     pub(crate) fn refused(&mut self, edits: &[Edit]) -> String {
         let (rev, changes) = (
             self.world.scene_rev(),
@@ -281,7 +281,7 @@ impl Bench {
         self.world.changes().inserted.contains(&self.slot(name))
     }
 
-    /// Why the body left the broad phase in this tick.
+    /// The cause for which the body left the broad phase in this tick.
     pub(crate) fn removed(&self, name: &str) -> Option<EndCause> {
         let slot = self.slot(name);
         let removed = &self.world.changes().removed;

@@ -1,4 +1,4 @@
-//! Which bodies are known.
+//! Which bodies count as known.
 
 use sweepd::config::OnStale;
 use sweepd::math::Pose;
@@ -39,7 +39,7 @@ fn law_3_7_nan_from_an_exploded_solver_makes_its_body_unknown_and_keeps_the_last
         position: [f64::NAN, 0.0, 0.0],
         ..row(1, 0.0)
     };
-    // The other body's good row is not lost for it.
+    // The valid row of the other body is still applied.
     assert_eq!(
         bench.send(MS, "sim", 2, &[bad, row(2, 6.0)]),
         admitted(0, 1, 1)
@@ -51,7 +51,7 @@ fn law_3_7_nan_from_an_exploded_solver_makes_its_body_unknown_and_keeps_the_last
     assert_eq!(bench.rejects(RejectReason::NotFinite), 1);
     assert!(bench.has_reason(Reason::Rejected));
     assert!(bench.world.filters().keeps(bench.slot("a")));
-    // The next good one, even if it is the last good one over again, ends it.
+    // The next valid pose makes the body known, even if it equals the last valid one.
     bench.send(MS, "sim", 3, &[row(1, 0.0), row(2, 6.0)]);
     assert_eq!(bench.status("a"), BodyStatus::Known);
     assert!(bench.world.changes().requery.contains(&bench.slot("a")));
@@ -102,7 +102,7 @@ fn law_3_7_two_poses_of_one_body_in_one_frame_make_it_unknown() {
     let twice = [row(1, 1.0), row(2, 5.0), row(1, 2.0)];
     assert_eq!(bench.send(MS, "sim", 2, &twice), admitted(0, 1, 2));
     assert_eq!(bench.status("a"), BodyStatus::Rejected);
-    // Neither of the two is taken.
+    // Neither of the duplicate rows is applied.
     assert_eq!(bench.body("a").pose.translation.vector.x, 0.0);
     assert_eq!(bench.rejects(RejectReason::Duplicate), 2);
     assert_eq!(bench.status("b"), BodyStatus::Known);
@@ -127,7 +127,7 @@ fn law_3_7_a_stale_body_reaches_as_far_as_its_speed_and_age_say() {
     assert!(bench.world.changes().moved.contains(&bench.slot("a")));
     assert!(bench.world.changes().restated.contains(&bench.slot("a")));
     assert!(bench.has_reason(Reason::Stale));
-    // It grows with every tick, up to `stale_reach_m` (1 m); beyond it nothing is known any more.
+    // The reach grows with every tick up to `stale_reach_m` (1 m); beyond it the body may be anywhere.
     bench.wait(1000 * MS);
     let reach_m = bench.body("a").reach_m;
     assert!((0.75..0.7501).contains(&reach_m), "{reach_m}");
@@ -149,7 +149,7 @@ fn law_3_7_the_reaches_of_two_stale_bodies_that_approach_add() {
         ..moving(name, id)
     };
     let mut bench = Bench::of(vec![fast("a", 1), fast("b", 2)]);
-    // 1 m of air between them. After 0.55 s either may be 0.55 m nearer: neither alone closes the gap, both do.
+    // The gap is 1 m. After 0.55 s each body may be 0.55 m nearer: one alone does not close the gap, both together do.
     bench.send(MS, "sim", 1, &[row(1, 0.0), row(2, 2.0)]);
     assert!(!bench.body("a").proxy.overlaps(&bench.body("b").proxy));
     bench.wait(550 * MS);
@@ -231,7 +231,7 @@ fn law_3_8_a_suspended_machine_has_old_data() {
 fn law_3_8_age_counts_from_sending_and_never_later_than_receipt() {
     let mut bench = Bench::of(vec![moving("a", 1), moving("b", 2)]);
     let now_ns = bench.now_ns + 1000 * MS;
-    // Sent 499 ms before it came.
+    // Sent 499 ms before it is received.
     let old = frame("sim", 1, now_ns - 499 * MS, &[row(1, 0.0)]);
     let old = sweepd::wire::Frame {
         received_ns: now_ns,
@@ -242,7 +242,7 @@ fn law_3_8_age_counts_from_sending_and_never_later_than_receipt() {
     assert_eq!(bench.world.next_timeout(), Some(now_ns + MS));
     bench.wait(MS);
     assert_eq!(bench.status("a"), BodyStatus::Stale);
-    // A stamp from the future buys no time.
+    // A stamp in the future does not extend the age limit.
     let now_ns = bench.now_ns + MS;
     let mut ahead = frame("sim", 2, now_ns, &[row(2, 0.0)]);
     ahead.header.sent_ns = now_ns + 10_000 * MS;
@@ -280,7 +280,7 @@ fn law_3_8_frames_that_waited_without_sent_ns_make_nothing_known() {
     bench.tick_at(now_ns, &[], &[waited.clone()]);
     assert_eq!(bench.status("a"), BodyStatus::NotReceived);
     assert_eq!(bench.rejects(RejectReason::TooOld), 1);
-    // One that says when it was sent may have waited.
+    // A frame with a send time may have waited.
     waited.header.seq = 2;
     waited.header.sent_ns = now_ns;
     bench.tick_at(now_ns, &[], &[waited]);
@@ -314,10 +314,10 @@ fn bug_a_time_out_that_was_set_and_the_ages_of_before_did_not_agree() {
     bench.send(MS, "sim", 1, &[row(1, 0.0), row(2, 3.0)]);
     bench.wait(100 * MS);
     bench.world.set_timeout(0, 50 * MS);
-    // Until the next tick, all is as the last one said.
+    // Until the next tick all statuses stay as published.
     bench.world.validate().unwrap();
     assert_eq!(bench.status("a"), BodyStatus::Known);
-    // It judges what was sent before, and not before it has heard what came.
+    // The next tick applies the new timeout to earlier poses, but only after it has received its frames.
     let now_ns = bench.now_ns + MS;
     let mut some = frame("sim", 2, now_ns, &[row(2, 3.0)]);
     some.header.flags = sweepd::wire::frame_flags::PARTIAL;
@@ -326,7 +326,7 @@ fn bug_a_time_out_that_was_set_and_the_ages_of_before_did_not_agree() {
     assert_eq!(bench.status("b"), BodyStatus::Known);
     assert_eq!(bench.removed("b"), None);
     assert_eq!(bench.world.next_timeout(), Some(now_ns + 50 * MS));
-    // As young as it was it is known again where more is allowed.
+    // With a longer timeout the body is known again, at its age.
     bench.world.set_timeout(0, TIMEOUT_NS);
     bench.wait(60 * MS);
     assert_eq!(bench.status("a"), BodyStatus::Known);

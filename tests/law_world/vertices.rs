@@ -7,7 +7,7 @@ use sweepd::world::Admission;
 
 use crate::support::{Bench, MS, cloth, moving, row};
 
-/// Sends all vertices of the sheet, with a header changed by `change`.
+/// Sends all vertices of the sheet, with the header changed by `change`.
 fn bend(bench: &mut Bench, version: u64, change: impl FnOnce(&mut VertexHeader)) -> Admission {
     let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
     let mut frame = VertexFrame {
@@ -32,7 +32,7 @@ fn bend(bench: &mut Bench, version: u64, change: impl FnOnce(&mut VertexHeader))
     bench.world.admit_vertices(&frame, bench.now_ns)
 }
 
-/// A sheet whose pose and vertices are known, of a source that goes on sending its poses.
+/// A sheet with known pose and vertices, whose source continues to send poses.
 fn known_sheet() -> Bench {
     let mut bench = Bench::of(vec![moving("a", 1)]);
     bench.world.set_boot(7);
@@ -49,7 +49,7 @@ fn step(bench: &mut Bench, seq: u64) {
     bench.send(MS, "sim", seq, &[row(1, 0.0), row(sheet, 5.0)]);
 }
 
-/// What makes a message unreadable, and the reason it is refused for.
+/// A change that makes a message unreadable, and the reason for its refusal.
 type Wrong = (fn(&mut VertexHeader), RejectReason);
 
 #[test]
@@ -65,7 +65,7 @@ fn bug_a_sheet_whose_newest_vertices_were_refused_for_their_layout_or_boot_staye
             matches!(admission, Admission::Refused { source: Some(_), reason: told } if told == reason),
             "{admission:?}"
         );
-        // Good poses do not make up for it.
+        // Valid poses do not make the vertices valid.
         step(&mut bench, 3);
         assert_eq!(bench.status("cloth"), BodyStatus::Rejected);
         assert_eq!(bench.body("cloth").reject, Some(reason));

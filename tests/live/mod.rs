@@ -1,5 +1,5 @@
-//! The real binary as a child process, for tests of what a user meets: each daemon has an instance of its own, every
-//! child is ended and waited for, and every wait has an end.
+//! The real binary as a child process, for tests of what a user sees: each daemon has its own instance, every child is
+//! ended and reaped, and every wait has a time limit.
 #![allow(
     dead_code,
     clippy::unwrap_used,
@@ -23,12 +23,12 @@ use sweepd::transport::client::{Client, FrameInfo, Heard, Rows, Topics};
 use sweepd::wire::{RejectReason, State, TickRow, TransformRow};
 
 pub const SECOND_NS: u64 = 1_000_000_000;
-/// Nothing here takes longer, however busy the machine is.
+/// Longest wait: no operation of these tests takes longer, even on a busy machine.
 pub const LONG: Duration = Duration::from_secs(60);
 
 static NUMBERS: AtomicU64 = AtomicU64::new(0);
 
-/// Two unit spheres (`a` id 1, `b` id 2) of source `sim`, in lockstep.
+/// Two spheres of radius 0.5 m (`a` id 1, `b` id 2) with source `sim`, in lockstep.
 pub const TWO_SPHERES: &str = r#"
 [run]
 on_frame = "sim"
@@ -43,7 +43,7 @@ name = "b"
 shape = { type = "sphere", radius = 0.5 }
 "#;
 
-/// A folder for scenes and logs, and an instance name; the folder goes when it is dropped.
+/// A folder for scenes and logs, and an instance name; the folder is deleted on drop.
 #[derive(Debug)]
 pub struct Desk {
     pub instance: String,
@@ -59,7 +59,7 @@ impl Desk {
         Self { instance, dir }
     }
 
-    /// Writes a file, whole at any moment: a daemon that was just started may be reading the one before.
+    /// Writes a file atomically: a daemon that was just started may still be reading the previous content.
     pub fn write(&self, name: &str, text: &str) -> PathBuf {
         let path = self.dir.join(name);
         let number = NUMBERS.fetch_add(1, Ordering::Relaxed);
@@ -69,17 +69,17 @@ impl Desk {
         path
     }
 
-    /// A scene file with this text.
+    /// Writes a scene file with this text.
     pub fn scene(&self, text: &str) -> PathBuf {
         self.write("scene.toml", text)
     }
 
-    /// `sweepd COMMAND SCENE? --instance OURS ARGS`, its output in files of the desk.
+    /// Starts `sweepd COMMAND ARGS --instance INSTANCE`, with its output in files of the desk.
     pub fn start(&self, command: &str, args: &[&str]) -> Running {
         self.start_as(sweepd(), command, args)
     }
 
-    /// The same by a binary with surroundings of its own.
+    /// The same with a binary in a given environment.
     pub fn start_as(&self, mut binary: Command, command: &str, args: &[&str]) -> Running {
         let number = NUMBERS.fetch_add(1, Ordering::Relaxed);
         let file = |what: &str| self.dir.join(format!("{command}_{number}.{what}"));
@@ -100,7 +100,7 @@ impl Desk {
         }
     }
 
-    /// A daemon for this scene; it may not be up yet, clients wait for it.
+    /// Starts a daemon for this scene. It may not be ready yet on return; clients wait for it.
     pub fn run(&self, scene: &str, args: &[&str]) -> Running {
         let path = self.scene(scene);
         let mut all = vec![path.to_str().unwrap()];
@@ -112,14 +112,14 @@ impl Desk {
         Client::connect(&self.instance, source, 30 * SECOND_NS).unwrap()
     }
 
-    /// A source that listens to everything.
+    /// Connects a client that feeds this source and subscribes to everything.
     pub fn source(&self, name: &str) -> Client {
         let mut client = self.client(Some(name));
         client.subscribe(Topics::ALL).unwrap();
         client
     }
 
-    /// Files by this instance's name: the lock, and the services of iceoryx2 that say it.
+    /// Files of this instance: the lock, and the services of iceoryx2 whose text names it.
     pub fn files(&self) -> Vec<PathBuf> {
         let mut found = Vec::new();
         for dir in ["/dev/shm", "/tmp/iceoryx2/services"] {
@@ -144,15 +144,15 @@ impl Drop for Desk {
     }
 }
 
-/// The binary under test, without anything of the surroundings that changes its output.
+/// The binary under test, without environment variables that change its output.
 pub fn sweepd() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sweepd"));
     command.env_remove("NO_COLOR");
     command
 }
 
-/// The binary under a limit, by the words of a shell: `ulimit -n 20`. Files that clients of this test program have open
-/// would be its own, too, and are closed before.
+/// The binary with a resource limit, given as shell code: `ulimit -n 20`. File descriptors inherited from this test
+/// program, which has clients open, would count towards the limit, so the shell closes them first.
 pub fn limited(limit: &str) -> Command {
     let close =
         r#"for f in /proc/self/fd/*; do f=${f##*/}; [ "$f" -gt 2 ] && eval "exec $f>&-"; done"#;
@@ -163,7 +163,7 @@ pub fn limited(limit: &str) -> Command {
     command
 }
 
-/// The binary as a shell starts it that leaves SIGHUP as it is by default, or has it ignored, as `nohup` does.
+/// The binary with SIGHUP ignored, as `nohup` starts it, or with its default action.
 pub fn with_hangups(ignored: bool) -> Command {
     let mut command = Command::new("env");
     let way = if ignored {
@@ -175,7 +175,7 @@ pub fn with_hangups(ignored: bool) -> Command {
     command
 }
 
-/// Runs a command to its end.
+/// Runs a command until it ends.
 pub fn run_out(mut command: Command, args: &[&str]) -> Output {
     command
         .args(args)
@@ -185,12 +185,12 @@ pub fn run_out(mut command: Command, args: &[&str]) -> Output {
     finish(command.spawn().unwrap())
 }
 
-/// Runs the binary to its end.
+/// Runs the binary until it ends.
 pub fn output(args: &[&str]) -> Output {
     run_out(sweepd(), args)
 }
 
-/// Waits for a child with piped output; kills it when it takes far too long.
+/// Waits for a child with piped output; kills it after [`LONG`].
 pub fn finish(mut child: Child) -> Output {
     let mut pipes = (child.stdout.take(), child.stderr.take());
     let read = |pipe: Option<&mut dyn Read>| {
@@ -222,7 +222,7 @@ pub fn finish(mut child: Child) -> Output {
     }
 }
 
-/// A running child; ended and waited for when it is dropped.
+/// A running child; terminated and reaped on drop.
 #[derive(Debug)]
 pub struct Running {
     child: Child,
@@ -235,7 +235,7 @@ impl Running {
         self.child.id()
     }
 
-    /// Sets what it may have of something from now on.
+    /// Sets a soft resource limit of the child.
     pub fn limit(&self, what: Resource, most: u64) {
         let pid = Some(Pid::from_child(&self.child));
         let maximum = getrlimit(what).maximum;
@@ -250,7 +250,7 @@ impl Running {
         kill_process(Pid::from_child(&self.child), signal).unwrap();
     }
 
-    /// `kill -9`, and `wait`: a process that nobody waited for counts as alive.
+    /// Kills it with SIGKILL and reaps it: an unreaped process counts as alive.
     pub fn kill(&mut self) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
@@ -260,7 +260,7 @@ impl Running {
         self.child.try_wait().unwrap()
     }
 
-    /// Waits for its end; returns how it ended and how long that took.
+    /// Waits for its end; returns its exit status and the duration of the wait.
     pub fn end(&mut self) -> (ExitStatus, Duration) {
         let start = Instant::now();
         loop {
@@ -272,7 +272,7 @@ impl Running {
         }
     }
 
-    /// SIGTERM and the end.
+    /// Sends SIGTERM and waits for the end.
     pub fn stop(&mut self) -> (ExitStatus, Duration) {
         self.signal(Signal::TERM);
         self.end()
@@ -286,7 +286,7 @@ impl Running {
         read_text(&self.stderr)
     }
 
-    /// Shared memory and files of iceoryx2 that it holds open or mapped.
+    /// Shared memory of iceoryx2 that it has mapped.
     pub fn shared(&self) -> Vec<PathBuf> {
         let maps = read_text(Path::new(&format!("/proc/{}/maps", self.pid())));
         let mut paths: Vec<PathBuf> = maps
@@ -306,7 +306,7 @@ impl Drop for Running {
         if self.ended().is_some() {
             return;
         }
-        // A chance to clean up first.
+        // SIGTERM first, so that it can clean up.
         let _ = kill_process(Pid::from_child(&self.child), Signal::TERM);
         let start = Instant::now();
         while self.ended().is_none() {
@@ -324,7 +324,7 @@ fn read_text(path: &Path) -> String {
     String::from_utf8_lossy(&std::fs::read(path).unwrap_or_default()).into_owned()
 }
 
-/// Waits until it holds.
+/// Waits until the condition holds.
 pub fn until(what: &str, mut holds: impl FnMut() -> bool) {
     let start = Instant::now();
     while !holds() {
@@ -333,7 +333,7 @@ pub fn until(what: &str, mut holds: impl FnMut() -> bool) {
     }
 }
 
-/// A row for a body at a place on the x axis.
+/// A row that places a body on the x axis.
 pub fn at(body: u64, x: f64) -> TransformRow {
     TransformRow {
         body,
@@ -343,7 +343,7 @@ pub fn at(body: u64, x: f64) -> TransformRow {
     }
 }
 
-/// One step; the view is its result.
+/// Sends a frame and waits for its result, which is in the client's view afterwards.
 pub fn step(client: &mut Client, rows: &[TransformRow]) {
     client
         .step(&FrameInfo::default(), Rows::Poses(rows), 30 * SECOND_NS)
@@ -356,7 +356,7 @@ pub fn send(client: &mut Client, rows: &[TransformRow]) {
         .unwrap();
 }
 
-/// The first tick from now on for which it holds; every one on the way is looked at by `each`.
+/// Waits for the first tick from now on for which the condition holds.
 pub fn tick_until(
     client: &mut Client,
     what: &str,
@@ -383,7 +383,7 @@ pub fn rejected(tick: &TickRow, reason: RejectReason) -> u64 {
     tick.rejects[usize::from(reason.code())]
 }
 
-/// What a tick says, for messages of tests.
+/// A tick as text, for messages of tests.
 pub fn words(tick: &TickRow) -> String {
     format!(
         "tick {} {:?} reasons {:b} cause {} rejects {:?}",

@@ -1,4 +1,4 @@
-//! Flat floors: tilt at most 0.05 degrees, no flips, at most four points, ids that stay.
+//! Flat floors: tilt at most 0.05 degrees, no flips, at most four points, stable ids.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -29,20 +29,20 @@ fn floor(rng: &mut Rng, kind: usize, cells: usize) -> String {
     }
 }
 
-/// What a run over a floor has shown.
+/// Results of a run over a floor.
 #[derive(Default)]
 struct Seen {
     rows: u64,
     tilt_deg: f64,
     flips: u64,
-    /// Contacts of all ticks but the first, and how many of their ids were there in the tick before.
+    /// Contacts of all ticks but the first, and the number of their ids that the tick before had too.
     followed: u64,
     kept: u64,
     least_points: usize,
     least_area: f64,
 }
 
-/// Slides and spins a body over a floor, pushed in by `depth`.
+/// Slides and spins a body over a floor, which it penetrates by `depth`.
 fn slide(floor: &str, kind: &Kind, floor_first: bool, depth: f64, spin: f64, seed: u64) -> Seen {
     let mut rng = Rng::new(seed);
     let mut drive = drive(&scene(floor, &kind.shape, floor_first));
@@ -81,7 +81,7 @@ fn slide(floor: &str, kind: &Kind, floor_first: bool, depth: f64, spin: f64, see
     seen
 }
 
-/// Every kind of body over every kind of floor, at several depths.
+/// Every kind of body on every kind of floor, at several depths.
 #[test]
 fn on_a_flat_floor_no_normal_is_tilted_or_flipped_and_ids_stay() {
     let mut told = String::new();

@@ -5,7 +5,7 @@ use crate::oracle::rng::Rng;
 use crate::support::{contacts, drive, scene, sheet};
 use sweepd::math::Pose;
 
-/// A query that takes more than one turn was taken for done once its verdict was there, and its contacts were those of
+/// A query that takes more than one turn counted as finished once it had its verdict, and its contacts were those of
 /// the tick before.
 #[test]
 fn bug_contacts_of_a_long_query_were_those_of_the_tick_before() {

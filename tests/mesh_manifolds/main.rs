@@ -1,8 +1,9 @@
-//! Goal: manifolds on meshes without internal-edge artefacts: normals of a flat floor are the floor's wherever the
-//! edges of its triangles lie, few points span what touches, and a contact keeps its id while the body slides.
+//! Goal: manifolds on meshes without internal-edge artefacts: on a flat floor normals equal that of the floor
+//! regardless of its triangle edges, few points span the contact area, and a contact keeps its id while the body
+//! slides.
 //!
-//! Method: an engine with two bodies and no limit; bodies of every kind rest, slide, spin and are pushed in over floors
-//! of random triangles. What must come out is known from how the scene was made.
+//! Method: an engine with two bodies and no limit; bodies of every kind rest on, slide over, spin on and penetrate
+//! floors of random triangles. The expected results follow from the construction of the scene.
 
 #![allow(
     dead_code,

@@ -1,7 +1,7 @@
 //! Goal: every contact point lies on the surface of its body.
 //!
-//! Method: pairs of all kinds pushed into each other at random; how far a point is off a surface comes from closed
-//! forms for convex shapes and from brute force for meshes.
+//! Method: pairs of all kinds with random overlaps; the distance of a point from a surface comes from closed forms for
+//! convex shapes and from brute force for meshes.
 
 use std::collections::BTreeMap;
 
@@ -15,10 +15,11 @@ use sweepd::math::{Point, Pose, Vec3};
 use sweepd::wire::pair_flags;
 
 const SEEDS: u64 = 800;
-/// How far a point may be off, metres: sizes are about 1, and what lies 1e-6 of them above counts as a contact.
+/// Tolerance of the distance from the surface, metres: sizes are about 1, and a point up to 1e-6 of the size above the
+/// surface counts as a contact.
 const OFF_M: f64 = 2e-6;
 
-/// What a body is made of, and how far a point of its frame is off its surface, metres.
+/// The shape of a body, from which the distance of a point (body frame, metres) from its surface is computed.
 enum Form {
     Sphere(f64),
     Cuboid(Vec3),
@@ -31,7 +32,7 @@ enum Form {
     Mesh(Soup),
 }
 
-/// Distance of a point of the half-plane (from the axis, along it) from a polyline.
+/// Distance of a point from a polyline, in the half-plane of distance from the axis and height along it.
 fn off_line(p: [f64; 2], line: &[[f64; 2]]) -> f64 {
     let piece = |w: &[[f64; 2]]| {
         let (d, q) = (
@@ -167,8 +168,8 @@ fn contact_points_lie_on_the_surfaces_of_their_bodies() {
     );
 }
 
-/// A ball that sinks into flat ground is as deep as how far its lowest point lies below, crossing it or wholly within, and
-/// the normal leads out: as of a ground that is a box.
+/// The depth of a ball in flat ground is that of its lowest point, whether it crosses the surface or lies wholly below
+/// it, and the normal points out of the ground: as for a box as the ground.
 #[test]
 fn bug_a_ball_whose_centre_is_below_the_ground_was_pushed_further_down() {
     let radius = 0.12;

@@ -1,4 +1,4 @@
-//! Floors, bodies, and an engine that holds one of each.
+//! Floors, bodies, and an engine with one of each.
 
 use std::fmt::Write as _;
 
@@ -13,8 +13,8 @@ use sweepd::wire::{ContactKind, ContactRow, Demand};
 /// Half the extent of a floor, metres.
 pub const FLOOR: f64 = 3.0;
 
-/// The upper faces of a floor at height 0: `cells` by `cells`, cut by random diagonals, with corners moved in the
-/// plane.
+/// The upper faces of a floor at height 0: `cells` by `cells` quads cut by random diagonals, with vertices moved within
+/// the plane.
 pub fn sheet(rng: &mut Rng, cells: usize, irregular: f64) -> Soup {
     let n = cells + 1;
     let step = 2.0 * FLOOR / cells as f64;
@@ -45,8 +45,8 @@ pub fn sheet(rng: &mut Rng, cells: usize, irregular: f64) -> Soup {
     Soup::new(vertices, faces)
 }
 
-/// Tiles laid in bond: corners of the one lie on sides of the other, none is shared, and there are cracks of a
-/// nanometre.
+/// Tiles laid in a running bond: corners of one tile lie on sides of others, no vertex is shared, and there are gaps of
+/// a nanometre.
 pub fn tiles(rng: &mut Rng, cells: usize) -> Soup {
     let step = 2.0 * FLOOR / cells as f64;
     let mut all = Soup::new(Vec::new(), Vec::new());
@@ -61,7 +61,7 @@ pub fn tiles(rng: &mut Rng, cells: usize) -> Soup {
                 all.vertices
                     .push(Point::new(x + crack.x, y + v * step + crack.y, 0.0));
             }
-            // Which way round a tile lies is anybody's guess: a sheet of tiles is no solid.
+            // The orientation of each tile is random: a sheet of tiles is not a solid.
             let faces = if rng.below(2) == 0 {
                 [[0, 1, 2], [0, 2, 3]]
             } else {
@@ -74,7 +74,7 @@ pub fn tiles(rng: &mut Rng, cells: usize) -> Soup {
     all
 }
 
-/// A sheet as the top of a solid slab.
+/// A solid slab with a sheet as its top.
 pub fn slab(top: &Soup, thick: f64) -> Soup {
     let count = u32::try_from(top.vertices.len()).unwrap();
     let mut all = top.clone();
@@ -96,7 +96,7 @@ pub fn slab(top: &Soup, thick: f64) -> Soup {
     all
 }
 
-/// A box whose faces are cut into `cells` by `cells` squares.
+/// A box whose faces are divided into `cells` by `cells` squares.
 pub fn fine_box(half: Vec3, cells: usize) -> Soup {
     let coarse = cuboid(half);
     let mut all = Soup::new(Vec::new(), Vec::new());
@@ -104,7 +104,7 @@ pub fn fine_box(half: Vec3, cells: usize) -> Soup {
         let [a, b, c] = f.map(|v| coarse.vertices[v as usize].coords);
         let at = |i: usize, j: usize| {
             let (u, v) = (i as f64 / cells as f64, j as f64 / cells as f64);
-            // Sums in one order, so that neighbours have the same corners to the last bit.
+            // Rounded sums in a fixed order, so that neighbouring faces have bit-identical vertices.
             let p = a + (b - a) * u + (c - b) * v;
             Point::from(p.map(|x| (x * 1e9).round() / 1e9))
         };
@@ -126,13 +126,13 @@ pub fn fine_box(half: Vec3, cells: usize) -> Soup {
     all
 }
 
-/// A body: its name, its shape, how high its origin is over what it rests on, and the area of its footprint (0: none).
+/// A body: its name, its shape, the height of its origin above the support, and the area of its footprint (0: none).
 pub struct Kind {
     pub name: &'static str,
     pub shape: String,
     pub height: f64,
     pub footprint: f64,
-    /// Turns it onto the side it lies on.
+    /// Rotation onto the side it lies on.
     pub lying: Vec3,
 }
 
@@ -211,7 +211,7 @@ pub fn kinds() -> Vec<Kind> {
     ]
 }
 
-/// A floor that does not move and a body that does; the floor's id is the lower one, or the higher.
+/// A fixed floor and a moving body; the floor has the lower id if `floor_first`, else the higher one.
 pub fn scene(floor: &str, body: &str, floor_first: bool) -> String {
     let (f, b) = if floor_first { (1, 2) } else { (2, 1) };
     format!(
@@ -225,7 +225,7 @@ pub fn drive(scene: &str) -> Drive {
     Drive::new(scene, Pattern::Wander, 1)
 }
 
-/// Contacts at a pose of the body.
+/// The contacts at a pose of the body.
 pub fn contacts(drive: &mut Drive, pose: &Pose) -> Vec<ContactRow> {
     drive.set(0, pose);
     let out = drive.send(Budget::UNLIMITED, Demand::ALL);
@@ -239,18 +239,18 @@ pub fn contacts(drive: &mut Drive, pose: &Pose) -> Vec<ContactRow> {
         .collect()
 }
 
-/// The normal of a row, off the floor.
+/// The normal of a row, pointing away from the floor.
 pub fn normal(row: &ContactRow, floor_first: bool) -> Vec3 {
     let normal = Vec3::from(row.normal);
     if floor_first { normal } else { -normal }
 }
 
-/// Degrees between two unit vectors; small ones to the last digit.
+/// Angle between two unit vectors, degrees; accurate for small angles.
 pub fn degrees(x: &Vec3, y: &Vec3) -> f64 {
     x.cross(y).norm().atan2(x.dot(y)).to_degrees()
 }
 
-/// Area of the hull of points seen from above.
+/// Area of the hull of the points, seen from above.
 pub fn area(rows: &[ContactRow]) -> f64 {
     let mut points: Vec<[f64; 2]> = rows.iter().map(|r| [r.point_a[0], r.point_a[1]]).collect();
     let centre = points

@@ -1,4 +1,4 @@
-//! Surfaces that are not flat: corners, ridges, shelves, balls of triangles, and floors that stand askew.
+//! Surfaces that are not flat: corners, ridges, shelves, triangulated balls, and floors at any orientation.
 
 use std::fmt::Write as _;
 
@@ -16,13 +16,13 @@ fn at(x: f64, y: f64, z: f64) -> Pose {
     Pose::translation(x, y, z)
 }
 
-/// Rows whose normal is within a twentieth of a degree of a direction.
+/// Rows whose normal is within 0.05 degrees of a direction.
 fn along(rows: &[ContactRow], first: bool, direction: &Vec3) -> Vec<ContactRow> {
     let near = |row: &&ContactRow| degrees(&normal(row, first), direction) <= 0.05;
     rows.iter().filter(near).copied().collect()
 }
 
-/// Points, depths and normals, a line each.
+/// Points, depths and normals as text, one line each.
 fn brief(rows: &[ContactRow]) -> String {
     let mut text = String::new();
     for r in rows {
@@ -35,7 +35,7 @@ fn brief(rows: &[ContactRow]) -> String {
     text
 }
 
-/// A sheet bent up along the line x = 0: floor for x > 0, wall for x < 0.
+/// A sheet folded up along the line x = 0: floor for x > 0, wall for x < 0.
 fn corner(rng: &mut Rng, cells: usize) -> Soup {
     let mut all = sheet(rng, cells, 0.0);
     for v in &mut all.vertices {
@@ -46,7 +46,7 @@ fn corner(rng: &mut Rng, cells: usize) -> Soup {
     all
 }
 
-/// A sheet bent down along x = 0 by 30 degrees on each side: a ridge.
+/// A sheet folded down along x = 0 by 30 degrees on each side: a ridge.
 fn ridge(rng: &mut Rng, cells: usize) -> Soup {
     let mut all = sheet(rng, cells, 0.0);
     let slope = 30.0_f64.to_radians().tan();
@@ -135,7 +135,7 @@ fn of_many_small_triangles_the_extremes_are_kept() {
     let floor = trimesh(&sheet(&mut rng, 120, 1.0), None);
     let mut drive = drive(&scene(&floor, BOX, true));
     for k in 0..10 {
-        // A little askew, so that the deepest points all lie at one end.
+        // Slightly tilted, so that all the deepest points are at one end.
         let turn = Quat::from_euler_angles(0.0, 1e-4, 0.3 * f64::from(k));
         let pose = Pose::from_parts(Vec3::new(0.1, 0.07, 0.249).into(), turn);
         let rows = contacts(&mut drive, &pose);
@@ -144,7 +144,7 @@ fn of_many_small_triangles_the_extremes_are_kept() {
     }
 }
 
-/// Floors that stand at any angle, bodies that lie on them a little askew: the normals are the floor's.
+/// Floors at any orientation, with bodies that lie on them slightly tilted: the normals are those of the floor.
 #[test]
 fn a_floor_that_stands_askew_is_as_flat() {
     let seeds = if cfg!(debug_assertions) { 40 } else { 400 };
@@ -152,13 +152,13 @@ fn a_floor_that_stands_askew_is_as_flat() {
     println!("worst tilt {worst:.2e} degrees");
 }
 
-/// Over the seams of tiles a climb found no corner higher than one it stood on, where the side it came to lay level.
+/// At the seams of tiles the climb stopped at a side that was level, because no neighbour was higher than its corner.
 #[test]
 fn bug_a_climb_over_tiles_ended_at_a_level_side() {
     assert!(tilt_on_askew_floor(337) < 1e-9);
 }
 
-/// Ten poses of some body on some floor; the greatest tilt of a normal, degrees.
+/// Ten poses of a random body on a random floor; returns the greatest tilt of a normal, degrees.
 fn tilt_on_askew_floor(seed: u64) -> f64 {
     let mut worst = 0.0_f64;
     let mut rng = Rng::new(seed);
@@ -201,8 +201,8 @@ fn tilt_on_askew_floor(seed: u64) -> f64 {
     worst
 }
 
-/// A ball of triangles pushed into a flat floor of small ones: the deepest point is found though its triangles cross
-/// none.
+/// A triangulated ball pushed into a flat floor of small triangles: the deepest point is found although its triangles
+/// cross none of the floor.
 #[test]
 fn a_ball_of_triangles_pushed_into_a_floor_has_its_deepest_point() {
     let ball = bumpy_sphere(24, 30, 0.0);
@@ -225,7 +225,8 @@ fn a_ball_of_triangles_pushed_into_a_floor_has_its_deepest_point() {
     }
 }
 
-/// A long beam over a short one: no corner of the one is within the other, and the manifold is where their edges cross.
+/// A long beam on a short one: no corner of one is inside the other, and the manifold is at the crossings of their
+/// edges.
 #[test]
 fn beams_that_cross_share_four_points() {
     let (along_x, along_y) = (Vec3::new(2.0, 0.3, 0.1), Vec3::new(0.2, 2.0, 0.1));
@@ -247,7 +248,7 @@ fn beams_that_cross_share_four_points() {
     }
 }
 
-/// On rough ground there is no truth to the digit: points lie on both surfaces, few a patch, normals out of the ground.
+/// On rough ground the exact manifold is unknown: points lie on both surfaces, few per patch, and normals point out.
 #[test]
 fn on_rough_ground_points_lie_on_both_and_normals_lead_out() {
     let mut counts = [0_usize; 3];
@@ -258,7 +259,7 @@ fn on_rough_ground_points_lie_on_both_and_normals_lead_out() {
         let kind = &all[rng.below(all.len())];
         let mut drive = drive(&scene(&trimesh(&ground, None), &kind.shape, true));
         let mut height = 2.0;
-        // Down until it touches, and a little further.
+        // Lowers the body until it touches, and a little further.
         while contacts(&mut drive, &at(0.1, 0.1, height)).is_empty() && height > -3.0 {
             height -= 0.01;
         }
@@ -283,7 +284,7 @@ fn on_rough_ground_points_lie_on_both_and_normals_lead_out() {
     );
 }
 
-/// Bodies that hang over the rim of a floor: the floor's normal as long as more lies on it than the depth.
+/// Bodies that hang over the rim of a floor: the normal is the floor's as long as more than the depth lies on it.
 #[test]
 fn over_the_rim_of_a_floor_the_normal_is_the_floors() {
     let mut text = String::new();
@@ -317,7 +318,7 @@ fn over_the_rim_of_a_floor_the_normal_is_the_floors() {
     assert!(text.is_empty(), "{text}");
 }
 
-/// The limit of a pair is shared by spread: with four points in all a corner still has both its normals.
+/// The points of a pair are chosen by their spread: even with four points in total a corner has both its normals.
 #[test]
 fn with_room_for_few_points_each_surface_has_one() {
     let floor = trimesh(&corner(&mut Rng::new(3), 16), None);

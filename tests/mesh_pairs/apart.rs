@@ -1,9 +1,9 @@
-//! Triangles a few millimetres apart are apart. Of such (edges of 40 to 70 mm, 2.2 to 4.0 mm apart) parry3d in f32 was
-//! seen to call some intersecting, which is why two leaves are asked by a predicate of our own; parry3d-f64 calls none
-//! of these so.
+//! Triangles a few millimetres apart are apart. For such triangles (edges of 40 to 70 mm, 2.2 to 4.0 mm apart) parry3d
+//! in f32 reported intersections, which is why pairs of leaves are tested with our own predicate; parry3d-f64 reports
+//! none of these.
 //!
-//! Method: triangles moved together until an oracle of points and edges says that they are so far apart, and a plane
-//! that parts them as a second witness.
+//! Method: triangles moved together until an oracle of points and edges gives the wanted distance, with a separating
+//! plane as a second check.
 
 use parry3d_f64::math::{Pose as TheirPose, Vector};
 use parry3d_f64::query::intersection_test;
@@ -40,7 +40,7 @@ fn distance(one: &Triangle, other: &Triangle) -> f64 {
     }
 }
 
-/// The second moved along a line until it is `apart_m` from the first; `None`: it is farther already.
+/// The second triangle moved along a line until it is `apart_m` from the first; `None`: it is already farther away.
 fn moved_to(one: &Triangle, other: &Triangle, along: &Vec3, apart_m: f64) -> Option<Triangle> {
     let at = |x: f64| other.map(|p| p + along * x);
     if distance(one, other) >= apart_m {
@@ -58,7 +58,7 @@ fn moved_to(one: &Triangle, other: &Triangle, along: &Vec3, apart_m: f64) -> Opt
     Some(at(far))
 }
 
-/// How far the best of all planes across a face, or two edges, or through the nearest corners parts the two.
+/// Separation by the best of all planes across a face, two edges, or the nearest corners.
 fn parted_by(one: &Triangle, other: &Triangle) -> f64 {
     let edges = |t: &Triangle| [t[1] - t[0], t[2] - t[1], t[0] - t[2]];
     let normal = |t: &Triangle| (t[1] - t[0]).cross(&(t[2] - t[0]));

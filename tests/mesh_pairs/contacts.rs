@@ -1,4 +1,4 @@
-//! Contact points that are cut off in the middle of a leaf's: those of a search that nobody cuts off.
+//! Contact searches that are interrupted within a leaf pair give the contacts of an uninterrupted search.
 
 use crate::oracle::meshes;
 use crate::oracle::rng::Rng;
@@ -8,7 +8,7 @@ use sweepd::narrow::mesh::{CarriedFront, FrontStore, Goal, LeafContact, Search};
 use sweepd::shape::Shape;
 use sweepd::time::{Clock, ManualClock, Meter};
 
-/// What is told of a pair, and in how many turns.
+/// The contacts of a pair, and the number of turns that they took.
 struct Told {
     covered: Option<Vec<(u32, u32)>>,
     points: Vec<[u64; 7]>,
@@ -22,7 +22,7 @@ fn bits(point: &LeafContact) -> [u64; 7] {
     [a.x, a.y, a.z, b.x, b.y, b.z, point.feature]
 }
 
-/// The contact set of a pair, in turns that end when the clock was read `reads` times; 0: in one.
+/// The contact set of a pair, in turns that end after `reads` clock reads; 0: in one turn.
 fn contacts(a: &Shape, b: &Shape, pos12: &Pose, reads: u64) -> Told {
     let clock = ManualClock::new(0);
     clock.step_each_read(1);
@@ -61,7 +61,7 @@ fn contact_sets_in_pieces_are_those_of_a_search_at_once() {
         );
         assert!(whole.covered == pieces.covered, "case {case}");
         assert_eq!(whole.least_m, pieces.least_m, "case {case}");
-        // A walk that begins again may come by another trail: then it ends at another place that reaches as far.
+        // A walk that restarts may take another path and end at another point that is equally deep.
         other += u64::from(whole.points != pieces.points);
         cut += u64::from(!whole.points.is_empty() && pieces.turns > 4);
     }
@@ -83,7 +83,7 @@ fn long_walks_are_cut_off_and_gone_on_with() {
             pieces.turns
         );
         assert_eq!(whole.least_m, pieces.least_m, "{shift}");
-        // As there; of points as many, and most the same.
+        // As above; the number of points is equal, and most points are.
         let other = (pieces.points.iter())
             .filter(|point| !whole.points.contains(point))
             .count();
@@ -103,7 +103,7 @@ fn bug_walks_of_another_pair_were_gone_on_with_when_less_was_asked_for_than_cont
     for (front, mesh) in fronts.iter_mut().zip(meshes) {
         front.start(&mut store, mesh, mesh, &pos12, Search::Carried);
     }
-    // Their contacts by turns, cut off all the time; now and then no more than the gap.
+    // Contacts of both in turn, constantly interrupted; some turns only ask for the gap or the verdict.
     for turn in 0..40_000 {
         let (front, mesh) = (&mut fronts[turn % 2], meshes[turn % 2]);
         let goal = [Goal::Contacts, Goal::Gap, Goal::Verdict][turn / 2 % 3];

@@ -1,4 +1,4 @@
-//! Overlaps told by balls within the two shapes: never deeper than they are, and told where they are deep.
+//! Overlaps proved by inner balls of the two shapes: never deeper than the true overlap, and found for deep pairs.
 
 use crate::oracle::Truth;
 use crate::oracle::meshes;
@@ -19,7 +19,8 @@ fn told(a: &Shape, b: &Shape, pos12: &Pose) -> Option<f64> {
     depth_m
 }
 
-/// By law 3.2 the gap changes by no more than the motion: two that overlap by a depth do so still after a shorter way.
+/// By law 3.2 the gap changes by at most the motion: two shapes that overlap by a depth still overlap after a shorter
+/// motion.
 #[test]
 fn law_3_2_what_balls_tell_is_no_deeper_than_the_overlap() {
     let (mut deep, mut solid, mut found) = (0, 0, 0);
@@ -63,7 +64,7 @@ fn law_3_2_what_balls_tell_is_no_deeper_than_the_overlap() {
     assert!(deep > CASES && 2 * found > solid, "{found} of {solid}");
 }
 
-/// Of two balls the truth is known: what their meshes tell is near it, and never more.
+/// For two balls the truth is known: the depth from their meshes is close to it, and never greater.
 #[test]
 fn balls_within_round_meshes_tell_nearly_the_whole_depth() {
     let ball = shape(&meshes::bumpy_sphere(24, 48, 0.0), None);
@@ -73,7 +74,7 @@ fn balls_within_round_meshes_tell_nearly_the_whole_depth() {
         let way = rng.direction() * rng.range(0.0, 2.2);
         let pos12 = Pose::from_parts(way.into(), rng.rotation());
         for (other, radius) in [(&ball, 1.0), (&sphere, 0.7)] {
-            // The greatest depth of a point of the one in the other.
+            // The greatest depth of a point of one ball in the other.
             let depth_m = (1.0 + radius - way.norm()).min(1.0);
             for depth in [
                 told(&ball, other, &pos12),
@@ -144,8 +145,8 @@ fn balls_that_told_nothing_are_not_asked_again_before_the_pair_has_moved_enough(
     assert_eq!(asked(1.51), (true, 1));
 }
 
-/// A corner that reaches in by a thousand roundings makes leaves cross by that much and no more: `gap_max` was what is
-/// rounded.
+/// A corner that penetrates by a thousand rounding errors makes leaves cross by only that much: `gap_max` was only the
+/// rounding error.
 #[test]
 fn bug_a_corner_that_reaches_in_by_more_than_is_rounded_overlaps() {
     let clock = ManualClock::new(0);

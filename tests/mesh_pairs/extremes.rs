@@ -1,4 +1,4 @@
-//! Extreme values: needles, nearly parallel edges, tiny beside huge, poses that are no poses, memory used again.
+//! Extreme values: needles, nearly parallel edges, tiny next to huge, invalid poses, reused memory.
 
 use crate::oracle::meshes;
 use crate::oracle::rng::Rng;

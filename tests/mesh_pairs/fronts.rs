@@ -1,4 +1,4 @@
-//! Certificate fronts: the invariant, soundness and verdicts, pose after pose, stopped at random.
+//! Certificate fronts: the invariant, soundness and verdicts at successive poses, interrupted at random.
 
 use crate::oracle::Truth;
 use crate::oracle::meshes;
@@ -24,7 +24,7 @@ fn all_leaves(a: &Shape, b: &Shape) -> Vec<(u32, u32)> {
     (0..m).flat_map(|i| (0..n).map(move |j| (i, j))).collect()
 }
 
-/// One tick of motion: at rest, a little, much, a leap, half a turn, or trembling.
+/// One tick of motion: none, small, large, a jump, half a turn, or a tremble.
 fn step(rng: &mut Rng, pose: &Pose, home: &Pose, small: f64) -> Pose {
     let by = |rng: &mut Rng, size: f64| {
         let turn = Quat::from_scaled_axis(rng.vector(size));
@@ -55,7 +55,7 @@ pub struct Couple<'a> {
 }
 
 impl<'a> Couple<'a> {
-    /// Two at their poses, either of them first.
+    /// Two shapes at their poses, in random order.
     pub fn either_way(rng: &mut Rng, one: (&'a Shape, Pose), other: (&'a Shape, Pose)) -> Self {
         let ((a, pose_a), (b, pose_b)) = if rng.below(2) == 0 {
             (one, other)
@@ -71,7 +71,7 @@ impl<'a> Couple<'a> {
     }
 }
 
-/// Takes a front through poses, stops it at random, and compares it with the truth each time.
+/// Moves a front through poses, interrupts it at random, and compares it with the truth each time.
 pub fn drive(rng: &mut Rng, couple: &mut Couple<'_>, search: Search, whole: bool, what: &str) {
     let (a, b) = (couple.a, couple.b);
     assert!(has_front(a, b), "{what}");
@@ -117,7 +117,7 @@ pub fn drive(rng: &mut Rng, couple: &mut Couple<'_>, search: Search, whole: bool
                     "{at}: {now:?}, but the gap is at most {gap}"
                 ),
             }
-            // At one pose it never loosens but for what rounding is.
+            // At one pose the interval never widens, except for rounding.
             assert!(
                 now.min >= last.min - tolerance && now.max <= last.max + tolerance,
                 "{at}: loosened from {last:?} to {now:?}"
@@ -139,7 +139,7 @@ pub fn drive(rng: &mut Rng, couple: &mut Couple<'_>, search: Search, whole: bool
     }
 }
 
-/// What is told of a pair without a search: each answer against the truth.
+/// Checks the answers of a pair that need no search against the truth.
 fn glance(
     front: &mut CarriedFront,
     (a, b): (&Shape, &Shape),
@@ -150,7 +150,7 @@ fn glance(
     let tolerance = 1e-11 * (a.radius + b.radius);
     let clock = ManualClock::new(0);
     let mut meter = Meter::unlimited(&clock);
-    // A new pair is asked along one line only.
+    // A new pair is tested along one line only.
     let _line = front.parted(a, b, pos12, &mut meter);
     let low = front.parted(a, b, pos12, &mut meter);
     let units = meter.spent();
@@ -165,7 +165,7 @@ fn glance(
     let again = front.parted(a, b, pos12, &mut meter);
     match low {
         Some(low) => assert!(again.is_some_and(|again| again >= low), "{at}: {again:?}"),
-        // Nothing has moved since none was found.
+        // Nothing has moved since no plane was found, so no work is repeated.
         None => assert_eq!((again, meter.spent()), (None, units), "{at}"),
     }
     if let Some(leaf) = front.touches_beside(a, b, (pos12, 0.0), &mut meter) {
@@ -181,8 +181,8 @@ fn glance(
     }
 }
 
-/// Balls with bumps that roll about one another: a plane parts them where they are a little apart, and where they go on
-/// touching, a walk comes to where they do now.
+/// Bumpy balls that roll about one another: while they are slightly apart a plane separates them, and while they stay
+/// in contact a walk from the last contact finds the current one.
 #[test]
 fn planes_and_walks_from_the_last_touch_tell_most_of_what_moves() {
     let ball = shape(&meshes::bumpy_sphere(20, 40, 0.05), None);
@@ -240,7 +240,7 @@ fn bug_a_walk_from_a_touch_that_was_cut_off_begins_anew_once_the_touch_is_back()
     let ball = shape(&meshes::bumpy_sphere(20, 40, 0.05), None);
     let clock = ManualClock::new(0);
     let (mut store, mut front) = (FrontStore::default(), CarriedFront::default());
-    // Turned, so that no edge lies in a face.
+    // Rotated, so that no edge lies in a face.
     let turn = Quat::from_scaled_axis(Vec3::new(0.3, 0.5, 0.2));
     let at = |x: f64| Pose::from_parts(Vec3::new(x, 0.13, 0.07).into(), turn);
     let (here, away) = (at(1.75), at(5.0));
@@ -437,13 +437,13 @@ fn law_3_3_a_front_keeps_what_is_inside_apart_from_what_is_outside() {
     }
 }
 
-/// Whether a thin plate that trembles about a wall within a hollow body is told to be in the wall where it is, pose
-/// after pose.
+/// Moves a thin plate back and forth through a wall of a hollow body; at each pose it must count as touching exactly
+/// when it is in the wall.
 fn tremble(rng: &mut Rng, hollow: &Shape, plate: &Shape, what: &str) {
     let clock = ManualClock::new(0);
     let (mut store, mut front) = (FrontStore::default(), CarriedFront::default());
     let at = Vec3::new(rng.range(-0.5, 0.5), rng.range(-0.5, 0.5), -0.7);
-    // It comes back to where it was, or near.
+    // It returns to earlier positions, or near them.
     let sides = [0.004, 0.008, -0.004, -0.008].map(|z| at + Vec3::z() * z);
     for tick in 0..30 {
         let side = if tick < 4 {
@@ -547,7 +547,7 @@ fn contact_points_are_made_when_they_are_asked_for_and_are_those_of_a_query_for_
         let at_once = run(&[Goal::Contacts]);
         let later = run(&[Goal::Verdict, Goal::Gap, Goal::Contacts]);
         assert_eq!(at_once.0, later.0, "case {case}");
-        // Which points of a patch span the most hangs on the order in which they come.
+        // Which points of a patch span it best depends on the order in which they are found.
         assert_eq!(at_once.1.is_empty(), later.1.is_empty(), "case {case}");
         touched += usize::from(!later.1.is_empty());
     }
@@ -594,7 +594,7 @@ fn a_front_without_room_is_sound_and_says_that_it_is_not_certain() {
         let mut rng = Rng::new(26_000_000 + case);
         let (a, b, [pose_a, mut pose_b], _) = any_two(&mut rng, way(case));
         let home = pose_b;
-        // Room for some groups and open pairs, and none for others.
+        // Room for the groups and open pairs of some cases, but not of all.
         let mut store = FrontStore::with_room(rng.below(40), rng.below(60));
         let mut front = CarriedFront::default();
         for pose in 0..POSES {
@@ -608,7 +608,7 @@ fn a_front_without_room_is_sound_and_says_that_it_is_not_certain() {
             let mut meter = Meter::new(&clock, None, Some(2000));
             let done = front.advance(&mut store, &a, &b, goal, u64::MAX, &mut meter);
             let (gap, tolerance) = (front.interval(), 1e-11 * (a.radius + b.radius));
-            // With all of it lumped together it holds no entry, and is no front that has yet to be started.
+            // A front whose entries are all merged holds none, but must still count as started.
             lumped += u32::from(front.is_empty());
             assert!(front.is_started(), "case {case}");
             match truth_of(&a, &b, &pose_a, &pose_b) {
@@ -630,6 +630,6 @@ fn a_front_without_room_is_sound_and_says_that_it_is_not_certain() {
         assert!(!front.is_started(), "case {case}");
     }
     assert!(decided > 0 && undecided > 0, "{decided} {undecided}");
-    // A few cases in a thousand, more than dev can bear.
+    // This occurs in a few cases in a thousand; debug builds run fewer.
     assert!(lumped > 0 || CASES < 300, "none was lumped together");
 }

@@ -72,7 +72,8 @@ fn half_spaces_meet_the_lowest_vertex() {
     }
 }
 
-/// Of a mesh that deforms heights are sums of its vertices' own coordinates, however near to the plane these are.
+/// Heights of a deforming mesh are sums with its vertices' own coordinates, so that their accuracy is limited by these,
+/// however close the plane is.
 #[test]
 fn bug_a_deforming_mesh_far_from_its_frame_is_known_no_better_than_its_vertices() {
     let low = Vec3::new(3_763_678.5, -657_891.75, -925_613.625);
@@ -93,7 +94,7 @@ fn bug_a_deforming_mesh_far_from_its_frame_is_known_no_better_than_its_vertices(
         centre: Point::origin(),
         radius: f64::INFINITY,
     };
-    // Exact: coordinates are eighths, and the normal's numbers multiples of 2^-55.
+    // Exact: coordinates are multiples of 1/8, and the components of the normal are multiples of 2^-55.
     let wanted = {
         let whole = |x: f64, unit: f64| {
             #[allow(clippy::cast_possible_truncation, reason = "whole numbers")]

@@ -1,7 +1,7 @@
-//! Meshes with holes: closed but for some faces, so surfaces that hold nothing, whatever is within them.
+//! Meshes with holes: closed except for some faces, so they are surfaces and contain nothing, whatever is inside them.
 //!
-//! Method: against the brute-force oracle, which takes them as the surfaces that they are, and beside the closed box,
-//! which does hold what is within.
+//! Method: compared with the brute-force oracle, which treats them as surfaces, and with the closed box, which does
+//! contain what is inside.
 
 use crate::fronts::{Couple, drive};
 use crate::oracle::Truth;
@@ -15,7 +15,7 @@ use sweepd::narrow::mesh::{CarriedFront, FrontStore, Goal, Search};
 use sweepd::shape::{Convex, Shape};
 use sweepd::time::{ManualClock, Meter};
 
-/// Of the boxes: half sides, metres. What is put into them is less than a third as large.
+/// Half sides of the boxes, metres. The shapes put into them are less than a third as large.
 const HALF: Vec3 = Vec3::new(1.0, 0.9, 1.1);
 
 /// The box without its lid, and the closed one.
@@ -40,7 +40,7 @@ fn law_3_3_a_box_without_its_lid_holds_nothing_and_lets_it_out() {
         let mut rng = Rng::new(seed);
         let origin = rng.vector(10.0);
         let pose_a = rng.pose(origin);
-        // In the middle, and half way out, where a lid would be.
+        // In the middle, and half way out, at the position of the lid.
         for at in [Vec3::zeros(), Vec3::z() * HALF.z] {
             let local = Pose::from_parts((at + rng.vector(0.1)).into(), rng.rotation());
             let pose_b = pose_a * local;
@@ -80,7 +80,7 @@ fn law_1_meshes_with_holes_hold_the_truth_at_every_pose_of_a_front() {
     }
 }
 
-/// Step by step out of the middle, where a lid would be and on: through a hole that is apart all the way.
+/// A shape moves step by step from the middle through the hole and on: it is apart all the way.
 #[test]
 fn law_3_3_a_front_goes_along_with_what_leaves_a_box_through_its_hole() {
     let small = shape(&meshes::cuboid(HALF * 0.3), None);

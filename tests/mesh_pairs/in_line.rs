@@ -1,4 +1,4 @@
-//! Solids whose faces are in line: what overlaps crosses nowhere, and is to be told from what only touches.
+//! Solids with coplanar faces: overlaps without any crossing of faces must be distinguished from contacts.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +12,7 @@ use sweepd::time::{ManualClock, Meter};
 
 type Cell = [i32; 3];
 
-/// Cubes of 1 m along a random way through a room of four each way.
+/// Cubes of side 1 m along a random path in a space of 4 by 4 by 4.
 fn cells(rng: &mut Rng) -> BTreeSet<Cell> {
     let mut at = [0; 3].map(|_: i32| [0, 1, 2, 3][rng.below(4)]);
     let mut all = BTreeSet::from([at]);
@@ -26,7 +26,7 @@ fn cells(rng: &mut Rng) -> BTreeSet<Cell> {
     all
 }
 
-/// Their surface.
+/// The surface of the cells.
 fn solid(cells: &BTreeSet<Cell>) -> Shape {
     let mut places: BTreeMap<Cell, u32> = BTreeMap::new();
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
@@ -62,9 +62,10 @@ fn solid(cells: &BTreeSet<Cell>) -> Shape {
     shape(&Soup::new(vertices, faces), Some(true))
 }
 
-/// How wide what two sets of cells share is at most, in its least direction, quarters of a metre; 0: it has no inside.
+/// Upper bound of the overlap of two sets of cells, in the direction of its least width, quarters of a metre; 0: no
+/// inside in common.
 ///
-/// * `off` - of the other, quarters.
+/// * `off` - offset of the other set, quarters of a metre.
 fn shared(one: &BTreeSet<Cell>, other: &BTreeSet<Cell>, off: Cell) -> i32 {
     let pair = |a: &Cell, b: &Cell| {
         let by = [0, 1, 2].map(|k| 4 - (4 * (b[k] - a[k]) + off[k]).abs());
@@ -74,7 +75,7 @@ fn shared(one: &BTreeSet<Cell>, other: &BTreeSet<Cell>, off: Cell) -> i32 {
     all.map(|(a, b)| pair(a, b)).max().unwrap()
 }
 
-/// Their gap, and the units that it took.
+/// The gap, and the units that it took.
 fn asked(a: &Shape, b: &Shape, pos12: &Pose) -> (Interval, u64) {
     let (mut store, mut query) = (FrontStore::default(), MeshQuery::default());
     let clock = ManualClock::new(0);
@@ -90,8 +91,8 @@ fn gap(a: &Shape, b: &Shape, pos12: &Pose) -> Interval {
     asked(a, b, pos12).0
 }
 
-/// A point's depth is known in solid meshes alone: where one of the two is none, no second point is asked for it.
-/// A point's depth is known in solid meshes alone.
+/// The depth of a point is defined in solid meshes only: if one of the two shapes is not one, no second point is tested
+/// for it.
 #[test]
 fn bug_a_box_that_stands_on_a_solid_pays_for_no_points_that_tell_nothing() {
     let floor = solid(&BTreeSet::from([[0, 0, 0]]));
@@ -104,7 +105,7 @@ fn bug_a_box_that_stands_on_a_solid_pays_for_no_points_that_tell_nothing() {
         units
     });
     let units: Vec<u64> = units.collect();
-    // 8 more each where all nine points are asked for.
+    // Testing all nine points would cost 8 more units each.
     assert!(units.iter().all(|units| *units <= 12), "{units:?}");
 }
 
@@ -114,7 +115,7 @@ fn bug_what_overlaps_along_faces_in_line_is_told_from_a_touch() {
     let (mut overlaps, mut told_as_touch, mut touches) = (0, 0, 0);
     for case in 0..3_000 {
         let (one, other) = (cells(&mut rng), cells(&mut rng));
-        // Along each axis in line, or a quarter, a half or three off.
+        // Along each axis coplanar, or off by one, two or three quarters.
         let off = [0; 3].map(|_: i32| [0, 0, 1, 2, 3][rng.below(5)] + [-4, 0, 4][rng.below(3)]);
         let way = Vec3::from(off.map(f64::from)) / 4.0;
         let found = gap(

@@ -1,4 +1,4 @@
-//! Counter-examples of the laws of meaning, one by one.
+//! Counter-examples of the laws on the meaning of results, one by one.
 
 use crate::oracle::meshes;
 use crate::oracle::rng::Rng;
@@ -131,7 +131,7 @@ fn coplanar_and_coincident_meshes_collide_by_touching() {
             let pose_b = pose_a * Pose::translation(offset.x, offset.y, offset.z);
             let end = run(&cuboid, other, &pose_a, &pose_b, Goal::Gap, "coplanar");
             assert!(end.min <= 0.0 && end.max <= 1e-12, "{offset:?} {end:?}");
-            // A hair apart is apart.
+            // A tiny gap is a gap.
             let pose_b = pose_a
                 * Pose::translation(
                     offset.x * 1.001,

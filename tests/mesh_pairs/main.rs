@@ -1,6 +1,6 @@
-//! Goal: walks over mesh pairs hold the truth at every interruption and end with the right verdict (laws 1, 3.2, 3.3).
-//! Method: random small meshes at random, nearly touching, deep, contained and far poses against the brute-force
-//! oracle of `tests/oracle`; thousands of pairs in release, hundreds in dev.
+//! Goal: walks over mesh pairs give sound intervals at every interruption and end with the right verdict (laws 1, 3.2,
+//! 3.3). Method: random small meshes at random, nearly touching, deep, contained and far poses, compared with the
+//! brute-force oracle of `tests/oracle`; thousands of pairs in release, hundreds in debug builds.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -100,7 +100,7 @@ fn a_ball_is_its_centre_less_its_radius() {
         let end = walk.interval();
         if held || apart < 0.0 {
             assert!(end.max <= 1e-13 && end.min < 0.0, "{name} {end:?}");
-            // A centre under the surface is as deep as its distance; the ball reaches deeper or equally deep.
+            // The depth of a centre below the surface is its distance from it; the depth of the ball is at least this.
             assert!(!held || end.min <= -about.distance_from(&centre) + 1e-12);
         } else {
             assert!(end.widened(1e-11).contains(apart), "{name} {end:?} {apart}");
@@ -125,7 +125,7 @@ fn a_closed_meter_stops_the_walk_at_once_and_it_resumes_where_it_was() {
     sliced.start(&a, &b, &pose);
     let mut spent = 0;
     loop {
-        // At most one unit past the end: the second of two node tests.
+        // It exceeds the limit by at most one unit: the second of two node tests.
         let mut meter = Meter::new(&clock, None, Some(7));
         let done = sliced.advance(&a, &b, Goal::Gap, u64::MAX, &mut meter);
         assert!(meter.spent() <= 8);
@@ -151,7 +151,7 @@ fn a_deadline_stops_the_walk_within_one_leaf_query() {
     let pose = Pose::new(Vec3::new(2.4, 0.1, 0.2), Vec3::new(0.3, 0.2, 0.1));
     for deadline_ns in [1, 50, 150] {
         let clock = ManualClock::new(0);
-        // Every look at the clock takes 10 ns, so one look late is 10 ns late.
+        // Every clock read takes 10 ns, so that one late read is 10 ns late.
         clock.step_each_read(10);
         let mut meter = Meter::new(&clock, Some(deadline_ns), None);
         let mut walk = Walk::default();
@@ -160,7 +160,7 @@ fn a_deadline_stops_the_walk_within_one_leaf_query() {
         assert!(!meter.open());
         let late = sweepd::time::Clock::monotonic_ns(&clock).saturating_sub(deadline_ns);
         assert!(late <= 20, "{late} ns late");
-        // And it is sound there, and goes on.
+        // The interval is sound at the interruption, and the walk can continue.
         assert!(walk.interval().min <= walk.interval().max);
         let mut meter = Meter::unlimited(&clock);
         assert!(walk.advance(&a, &a, Goal::Gap, u64::MAX, &mut meter));

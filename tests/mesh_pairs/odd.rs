@@ -1,7 +1,7 @@
-//! Odd meshes: one triangle, doubled faces, faces without an area, a plate without a thickness, five million faces.
+//! Odd meshes: one triangle, doubled faces, zero-area faces, a plate of zero thickness, five million faces.
 //!
-//! Method: each against a truth that is known in closed form, against the brute-force oracle, or against a plain mesh
-//! that bounds the same.
+//! Method: each is compared with a closed form, with the brute-force oracle, or with a plain mesh that bounds the same
+//! body.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,18 +16,18 @@ use sweepd::narrow::mesh::{FrontStore, Goal, MeshQuery, Walk, overlap};
 use sweepd::shape::{Convex, Shape};
 use sweepd::time::{ManualClock, Meter};
 
-/// Goals whose end is as exact as it gets.
+/// The goals with exact final intervals.
 const GOALS: [Goal; 2] = [Goal::Gap, Goal::Contacts];
-/// Poses at which two meshes that bound the same are compared.
+/// Poses at which two meshes that bound the same body are compared.
 const POSES: u64 = if cfg!(debug_assertions) { 32 } else { 200 };
 
-/// Runs a query in slices of one unit; at each the gap may be what is known of it, and in the end the verdict is right.
+/// Runs a query in slices of one unit; each interval must contain the truth, and the final verdict must be right.
 ///
 /// Sizes are about one metre, so tolerances are plain metres.
 fn hold(truth: Interval, what: &str, mut go: impl FnMut(u64, &mut Meter<'_>) -> (bool, Interval)) {
     let clock = ManualClock::new(0);
     let mut meter = Meter::unlimited(&clock);
-    // Without a unit first: what is known from the start on.
+    // The first slice has no units: it shows the initial interval.
     let mut units = 0;
     let end = loop {
         let (done, now) = go(units, &mut meter);
@@ -45,7 +45,7 @@ fn hold(truth: Interval, what: &str, mut go: impl FnMut(u64, &mut Meter<'_>) -> 
     assert!(is_hit || truth.max >= -1e-9, "{what} {end:?} {truth:?}");
 }
 
-/// A mesh and a ball by both kinds of queries and both ways round: each holds the truth all along.
+/// A mesh and a ball, with both kinds of queries and in both orders: each must be sound all along.
 fn meets_ball(mesh: &Shape, ball: &Shape, pos12: &Pose, truth: Interval, what: &str) {
     for (a, b, pos12) in [(mesh, ball, *pos12), (ball, mesh, pos12.inverse())] {
         let mut walk = Walk::default();
@@ -64,13 +64,13 @@ fn meets_ball(mesh: &Shape, ball: &Shape, pos12: &Pose, truth: Interval, what: &
     }
 }
 
-/// Whether balls within the two tell an overlap.
+/// Whether inner balls of the two prove an overlap.
 fn tells_depth(a: &Shape, b: &Shape, pos12: &Pose) -> bool {
     let clock = ManualClock::new(0);
     overlap((a, b), pos12, &mut Meter::unlimited(&clock)).is_some()
 }
 
-/// The sample has to be one: neither nearly all of it collides nor nearly none.
+/// Asserts that the sample is mixed: between 5 and 95 % of it collides.
 fn assert_mixed(colliding: u64, of: u64) {
     let is_mixed = 20 * colliding > of && 20 * colliding < 19 * of;
     assert!(is_mixed, "{colliding} of {of} collide");
@@ -91,7 +91,7 @@ fn a_mesh_of_one_triangle_is_as_far_as_its_triangle() {
         let (one, two) = (lone(&mut rng), lone(&mut rng));
         assert!(!mesh_of(&one).is_solid(), "seed {seed}");
 
-        // A ball that overlaps a triangle is parted from it by what its radius exceeds the distance.
+        // The depth of a ball in a triangle is its radius minus the distance of its centre.
         let (radius, at) = (rng.range(0.05, 0.6), rng.vector(1.5));
         let alone = placed(&one, &Pose::identity(), &Vec3::zeros());
         let gap = alone.distance_from(&Point::from(at)) - radius;
@@ -121,9 +121,9 @@ fn a_mesh_of_one_triangle_is_as_far_as_its_triangle() {
     assert_mixed(crossing, CASES * 4);
 }
 
-/// Asks two meshes that bound the same about a third shape: the same verdict, and where they are apart the same gap.
+/// Queries two meshes with the same boundary against a third shape: equal verdicts, and equal gaps if it is apart.
 ///
-/// Of an overlap neither has more than bounds, which `run` holds against the oracle. Yields whether they collide.
+/// For an overlap both have only bounds, which `run` compares with the oracle. Returns whether they collide.
 fn same(
     [plain, twin]: &[Shape; 2],
     other: &Shape,
@@ -137,7 +137,7 @@ fn same(
     });
     let size = plain.radius.max(other.radius);
     let truth = truth_of(plain, other, pose_a, pose_b);
-    // What touches within rounding may be told either way.
+    // A contact within rounding errors may have either verdict.
     if !matches!(truth, Truth::Apart(d) if d <= 1e-9 * size) {
         let agree = if one.min > 0.0 {
             two.min > 0.0 && (one.max - two.max).abs() <= 2e-9 * size
@@ -149,7 +149,7 @@ fn same(
     one.min <= 0.0
 }
 
-/// Boxes and their twins, as `twins` makes them from half sides, about other shapes; every fourth is within the box.
+/// Boxes and their twins, made by `twins` from half sides, against other shapes, of which every fourth is inside.
 fn compare(seed: u64, twins: impl Fn(Vec3) -> Vec<[Shape; 2]>) {
     let mut colliding = 0;
     for case in 0..POSES {
@@ -170,7 +170,7 @@ fn compare(seed: u64, twins: impl Fn(Vec3) -> Vec<[Shape; 2]>) {
         for (number, pair) in twins.iter().enumerate() {
             let what = format!("seed {} pair {number} - {name}", seed + case);
             let hit = same(pair, &other, [&pose_a, &pose_b], goal, &what);
-            // A solid has what is within it, its surface does not.
+            // A solid collides with what is inside it, its surface does not.
             assert!(!is_within || hit == mesh_of(&pair[0]).is_solid(), "{what}");
             colliding += u64::from(number == 0 && hit);
         }
@@ -178,16 +178,16 @@ fn compare(seed: u64, twins: impl Fn(Vec3) -> Vec<[Shape; 2]>) {
     assert_mixed(colliding, POSES);
 }
 
-/// Each face twice, on vertices of its own; the second time turned round or not.
+/// Each face twice, with separate vertices; the second copy is inverted if `turned`.
 fn doubled(soup: &Soup, turned: bool) -> Soup {
     let again = soup.clone();
     let again = if turned { again.inverted() } else { again };
     soup.clone().and(again)
 }
 
-/// Doubled faces close a mesh as single ones do, so it is a solid by default. Doubled as they are, the surface winds
-/// twice round what is inside (law 3.3: not 0 is inside): the plain box. With the second ones turned it winds round
-/// nothing: the box's surface.
+/// Doubled faces close a mesh as single ones do, so it is a solid by default. If both copies have the same orientation,
+/// the winding number inside is 2 (law 3.3: inside means not 0): the result is that of the plain box. If the second
+/// copy is inverted it is 0: the result is that of the box's surface.
 #[test]
 fn law_3_3_a_box_with_doubled_faces_is_the_box_or_where_they_cancel_its_surface() {
     compare(41_000_000, |half| {
@@ -209,7 +209,7 @@ fn push(soup: &mut Soup, vertex: Point) -> u32 {
     u32::try_from(soup.vertices.len() - 1).unwrap()
 }
 
-/// The same surface with a needle at the first side of each face: about a million times as long as high.
+/// The same surface with a needle at the first side of each face: about a million times as long as wide.
 fn with_needles(soup: &Soup) -> Soup {
     let mut all = Soup::new(soup.vertices.clone(), Vec::new());
     for &[a, b, c] in &soup.faces {
@@ -221,20 +221,20 @@ fn with_needles(soup: &Soup) -> Soup {
     all
 }
 
-/// The same surface, still closed, with faces that have no area. The second face's first side is to lie along an axis,
-/// so that the middle of it is in line to the last bit.
+/// The same surface, still closed, with faces of zero area. The first side of the second face must lie along an axis,
+/// so that its midpoint is collinear to the last bit.
 fn with_flats(soup: &Soup) -> Soup {
     let mut all = soup.clone();
     let [a, b, c] = all.faces[1];
     let [p, q, r] = [a, b, c].map(|v| all.vertices[v as usize]);
     let middle = push(&mut all, p + (q - p) * 0.5);
     let again = push(&mut all, r);
-    // A corner in the middle of the neighbour's side, and the face without an area that fills the crack.
+    // A vertex in the middle of the neighbour's side, and a zero-area face that closes the crack.
     all.faces[1] = [a, middle, c];
     all.faces.extend([[middle, b, c], [a, b, middle]]);
-    // Corners in line, there and back.
+    // Collinear vertices, in both directions.
     all.faces.extend([[a, middle, b], [b, middle, a]]);
-    // A vertex twice, three times, and another one in the same place.
+    // A repeated vertex, twice and three times, and another vertex at the same position.
     all.faces.extend([[a, a, b], [c, c, c], [c, again, a]]);
     all
 }
@@ -249,9 +249,9 @@ fn faces_without_an_area_change_no_verdict_beside_needles_either() {
     });
 }
 
-/// Two coincident squares of half side 1, glued at the rim: closed, and nothing inside.
+/// Two coincident squares of half side 1, joined at the rim: closed, with an empty interior.
 ///
-/// * `is_upright` - across x, along which inside tests look; else across z.
+/// * `is_upright` - perpendicular to x, the direction of inside tests; otherwise perpendicular to z.
 fn plate(rng: &mut Rng, is_upright: bool) -> Soup {
     let cells = [1, 4][rng.below(2)];
     let n = cells + 1;
@@ -262,7 +262,7 @@ fn plate(rng: &mut Rng, is_upright: bool) -> Soup {
         let [x, y] = [j, i].map(|k| 2.0 * k as f64 / cells as f64 - 1.0);
         let at = if is_upright { [0.0, x, y] } else { [x, y, 0.0] };
         let upper = push(&mut all, at.into());
-        // Within the rim each side has vertices of its own.
+        // Inside the rim each side has its own vertices.
         let is_rim = i % cells == 0 || j % cells == 0;
         let lower = if is_rim {
             upper
@@ -281,7 +281,7 @@ fn plate(rng: &mut Rng, is_upright: bool) -> Soup {
     all
 }
 
-/// It is closed, so a solid by default; but no point is under its surface, so its gap to a ball is that of the square.
+/// It is closed, so it is a solid by default; but no point is inside, so its gap to a ball is that of the square.
 #[test]
 fn law_3_3_a_closed_plate_of_no_thickness_holds_no_ball() {
     let mut touched = 0;
@@ -294,7 +294,7 @@ fn law_3_3_a_closed_plate_of_no_thickness_holds_no_ball() {
 
         let radius = rng.range(0.05, 0.6);
         let mut at = rng.vector(1.6);
-        // Some are level with it: beside it in its plane, or with their centre on it.
+        // Some are in the plane of the plate: beside it, or with their centre on it.
         at.z *= [0.0, 0.2, 0.5][rng.below(3)];
         let out = |x: f64| (x.abs() - 1.0).max(0.0);
         let gap = Vec3::new(out(at.x), out(at.y), at.z).norm() - radius;
@@ -325,7 +325,7 @@ fn law_3_3_a_closed_plate_of_no_thickness_collides_where_its_surface_is_touched(
         };
         let (pose_a, pose_b) = place(&mut rng, &plate, &other, way(case));
         let (goal, what) = (GOALS[rng.below(2)], format!("seed {seed} {name}"));
-        // The truth of a surface knows of no inside.
+        // For a surface the truth has no inside.
         let truth = truth_of(&shape(&soup, Some(false)), &other, &pose_a, &pose_b);
         for end in [
             run(&plate, &other, &pose_a, &pose_b, goal, &what),
@@ -372,9 +372,9 @@ fn boxes_that_lie_on_a_plate_or_at_its_rim_touch_it_and_a_hair_off_they_do_not()
     }
 }
 
-/// The corners are on a ball of radius 1. A point of a face with sides of `e` at most is within `e * e / 3` of it: the
-/// square of a mean of unit vectors is 1 less the products of their weights times the squares of the sides, and those
-/// products add up to a third at most. The gap is that of the ball, or larger by no more than that.
+/// The vertices lie on a ball of radius 1. A point of a face with sides of at most `e` is within `e * e / 3` of it: the
+/// square of a mean of unit vectors is 1 minus the products of the weights times the squares of the sides, and these
+/// products sum up to at most a third. The gap is that of the ball, or greater by at most that much.
 #[test]
 #[ignore = "takes minutes: cargo test --release -- --ignored; SWEEPD_CI_SLOW=1 .ci/run runs it"]
 fn a_sphere_of_five_million_triangles_is_a_ball_but_for_its_facets() {
@@ -382,14 +382,14 @@ fn a_sphere_of_five_million_triangles_is_a_ball_but_for_its_facets() {
     let globe = shape(&meshes::bumpy_sphere(rows, columns, 0.0), None);
     assert_eq!(mesh_of(&globe).faces().len(), 5_000_000);
     assert!(mesh_of(&globe).is_solid());
-    // The longest side goes along a meridian and a parallel.
+    // The longest side spans one step along a meridian and one along a parallel.
     let side = PI / rows as f64 + TAU / columns as f64;
     let sag = side * side / 3.0;
 
     let radius = 0.25;
     let ball = convex(Convex::sphere(radius));
     let mut rng = Rng::new(46_000_000);
-    // Apart, piercing, held: outside and inside alike a ball's gap is that of its centre less both radii.
+    // Apart, penetrating, contained: in all cases the gap of a ball is the distance of the centres minus both radii.
     for distance in [1.35, 1.1, 0.3] {
         let at = rng.direction() * distance;
         let gap = distance - 1.0 - radius;

@@ -1,8 +1,8 @@
-//! Goal: the more work mesh pairs are given, the more of them are decided, from nothing and in motion; and without a
-//! limit intervals are narrow.
-//! Method: pairs of closed meshes, a third overlapping, a third within 1 % of the size, a third apart, in an engine that
-//! is fed by hand with budgets in work units. Each verdict is compared with the truth of an unlimited twin: walks to
-//! the end over the other trees, nothing carried over.
+//! Goal: with more work units more mesh pairs are decided, from a cold start and in motion; and without a limit
+//! intervals are narrow.
+//! Method: pairs of closed meshes, a third overlapping, a third within 1 % of the size, a third apart, in an engine fed
+//! by hand with budgets in work units. Each verdict is compared with the truth of an unlimited twin: complete walks
+//! over the other trees, without carried state.
 
 use std::sync::Arc;
 
@@ -20,47 +20,47 @@ use sweepd::wire::{PairRow, Verdict, pair_flags};
 use sweepd::world::{Parts, PlacedShape};
 
 const SEED: u64 = 40_000_000;
-/// Pairs of the profile: so many that what the hard ones cost leaves no factor of two out, for in such a gap twice the
-/// budget would decide no more.
+/// Pairs of the profile: so many that the costs of the hard ones leave no gap of a factor of two, in which twice the
+/// budget would decide no more pairs.
 const PAIRS: usize = 120;
 /// Ticks of motion.
 const TICKS: usize = 40;
 /// Rows, columns and bumps of the profile's bodies: 2,208, 3,480 and 4,900 triangles.
 const BALLS: [(usize, usize, f64); 3] = [(24, 48, 0.0), (30, 60, 0.04), (36, 70, 0.06)];
-/// Of a body but for its bumps, metres.
+/// Diameter of a body without its bumps, metres.
 const DIAMETER_M: f64 = 2.0;
 /// Distance at which no two of them can touch: more than twice a radius of 1.06, metres.
 const FAR_M: f64 = 2.13;
-/// Motion of a surface point a tick, metres: 0.5 % of the diameter, half of it by the way and half by the turn.
+/// Motion of a surface point per tick, metres: 0.5 % of the diameter, half by translation and half by rotation.
 const PACE_M: f64 = 0.005 * DIAMETER_M;
-/// How far a pair goes to and fro from where it begins, metres: the near ones begin and cease to touch.
+/// Amplitude of a pair's motion, metres: near pairs begin and cease to touch.
 const SWING_M: f64 = 0.015 * DIAMETER_M;
-/// Between pairs, metres: no box reaches another pair's, though it is widened by [`REPORT_M`].
+/// Distance between pairs, metres: no box reaches another pair's even when enlarged by [`REPORT_M`].
 const SPACING_M: f64 = 20.0;
-/// Pairs nearer than this are reported with their intervals, metres: all that are asked for them.
+/// Pairs nearer than this are reported with their intervals, metres: all for which intervals are demanded.
 const REPORT_M: f64 = 2.0;
-/// The least budget of a cold start: of fewer units hardly a hard pair's first turn is left to share.
+/// The least budget of a cold start: below it hardly a hard pair's first turn is left to be shared.
 const UNITS_MIN: u64 = 128;
-/// Budgets a tick in motion, each twice the one before; the last is more than a tick takes.
+/// Budgets per tick in motion, each twice the one before; the last exceeds the work of any tick.
 const UNITS: [u64; 8] = [64, 128, 256, 512, 1_024, 2_048, 4_096, 8_192];
-/// From frame to frame, nanoseconds.
+/// Time from frame to frame, nanoseconds.
 const FRAME_NS: u64 = 10_000_000;
 
-/// How one pair moves: B about A, to and fro, turning.
+/// The motion of one pair: B moves about A, back and forth, and turns.
 #[derive(Clone)]
 struct Course {
-    /// Places of the two shapes.
+    /// Indices of the two shapes.
     kinds: [usize; 2],
     a: Pose,
-    /// Unit, world frame, from A to B.
+    /// Direction from A to B, unit length, world frame.
     away: Vec3,
-    /// Between the origins of the two, metres.
+    /// Distance of the two origins, metres.
     distance: f64,
-    /// About which it moves, metres.
+    /// Mean of this distance, metres.
     middle: f64,
-    /// Metres a tick.
+    /// Change of the distance, metres per tick.
     speed: f64,
-    /// Radians a tick, world frame.
+    /// Rotation, radians per tick, world frame.
     spin: Vec3,
     turn: Quat,
 }
@@ -87,7 +87,7 @@ impl Course {
         Pose::from_parts((from + self.away * self.distance).into(), self.turn)
     }
 
-    /// One tick.
+    /// Advances by one tick.
     fn advance(&mut self) {
         self.distance += self.speed;
         if (self.distance - self.middle).abs() > SWING_M {
@@ -98,7 +98,7 @@ impl Course {
         self.turn = Quat::new_normalize(turn.into_inner());
     }
 
-    /// What a walk to the end, without a limit, says of the gap at the poses of now.
+    /// The gap at the current poses from a complete walk without a limit.
     fn twin(&self, shapes: &[Arc<Shape>], goal: Goal, walk: &mut Walk) -> Interval {
         let [a, b] = self.kinds.map(|kind| &*shapes[kind]);
         let clock = ManualClock::new(0);
@@ -108,7 +108,7 @@ impl Course {
         walk.interval()
     }
 
-    /// Brings the two nearer, each time by a share of their gap: by law 3.2 they stay apart.
+    /// Moves the two closer, each time by a share of their gap: by law 3.2 they stay apart.
     fn approach(&mut self, shapes: &[Arc<Shape>], times: usize, share: f64, walk: &mut Walk) {
         for _ in 0..times {
             let gap = self.twin(shapes, Goal::Gap, walk);
@@ -117,7 +117,7 @@ impl Course {
     }
 }
 
-/// Bumpy balls of so many rows and columns.
+/// Bumpy balls with these numbers of rows and columns.
 fn balls(sizes: &[(usize, usize, f64)]) -> Vec<Arc<Shape>> {
     let ball = |&(rows, columns, bump): &(usize, usize, f64)| {
         Arc::new(shape(&meshes::bumpy_sphere(rows, columns, bump), None))
@@ -125,19 +125,19 @@ fn balls(sizes: &[(usize, usize, f64)]) -> Vec<Arc<Shape>> {
     sizes.iter().map(ball).collect()
 }
 
-/// The profile's pairs: apart, near and overlapping ones in turn.
+/// The pairs of the profile: apart, near and overlapping ones in turn.
 fn courses(shapes: &[Arc<Shape>]) -> Vec<Course> {
     let (mut rng, mut walk) = (Rng::new(SEED), Walk::default());
     let course = |pair: usize| {
-        // Near a diagonal the boxes overlap wherever the bodies are.
+        // Near a diagonal direction the boxes overlap at any distance that occurs.
         let away = (Vec3::new(1.0, 1.0, 1.0) + rng.vector(0.2)).normalize();
         let kinds = [pair / 3 % 3, pair / 9 % 3];
         let mut course = Course::new(pair, kinds, away, &mut rng);
-        // To where they all but touch, and from there apart or into one another.
+        // To where they almost touch, and from there apart or into each other.
         course.approach(shapes, 8, 0.999, &mut walk);
         course.distance += match pair % 3 {
             0 => rng.range(0.04, 0.3),
-            // From a hundredth of the size down to a ten thousandth: some are much harder to tell than others.
+            // From a hundredth of the size down to a ten thousandth: some are much harder to decide than others.
             1 => [1.0, -1.0][rng.below(2)] * DIAMETER_M * 10.0_f64.powf(rng.range(-4.0, -2.0)),
             _ => -rng.range(0.04, 0.6),
         };
@@ -149,7 +149,7 @@ fn courses(shapes: &[Arc<Shape>]) -> Vec<Course> {
     (0..PAIRS).map(course).collect()
 }
 
-/// An engine, and how all its pairs move.
+/// An engine, and the motion of all its pairs.
 struct Stage {
     rig: Rig,
     clock: Arc<ManualClock>,
@@ -184,7 +184,7 @@ impl Stage {
         }
     }
 
-    /// A tick at the poses of now.
+    /// Runs a tick at the current poses.
     fn tick(&mut self, budget: Budget) {
         self.clock.advance(FRAME_NS);
         let rows = (0_u64..).zip(&self.courses).flat_map(|(pair, course)| {
@@ -197,14 +197,14 @@ impl Stage {
         assert_eq!(self.rig.out().tick.candidates, self.courses.len() as u64);
     }
 
-    /// Rows of pairs that are no farther apart than is told, with the pair's place.
+    /// Rows of pairs within the report distance, with the index of the pair.
     fn told(&self) -> impl Iterator<Item = (usize, &PairRow)> {
         let rows = self.rig.out().pairs.iter();
         let there = rows.filter(|row| row.flags & pair_flags::GONE == 0);
         there.map(|row| (usize::try_from((row.body_a - 1) / 2).unwrap(), row))
     }
 
-    /// Whether each pair collides, as far as it is decided.
+    /// For each pair whether it collides; `None`: undecided.
     fn verdicts(&self) -> Vec<Option<bool>> {
         let mut all = vec![Some(false); self.courses.len()];
         for (pair, row) in self.told() {
@@ -223,14 +223,14 @@ fn advance(courses: &mut [Course]) {
     courses.iter_mut().for_each(Course::advance);
 }
 
-/// Whether each pair truly collides.
+/// For each pair whether it truly collides.
 fn truth(courses: &[Course], shapes: &[Arc<Shape>], walk: &mut Walk) -> Vec<bool> {
     let mut collides = |course: &Course| course.twin(shapes, Goal::Verdict, walk).min <= 0.0;
     courses.iter().map(&mut collides).collect()
 }
 
 pub fn body(id: u64, report_within_m: f64) -> BodySpec {
-    // What is built is handed over beside the scene.
+    // The built shapes are passed separately.
     let shape = PlacedSpec {
         shape: ShapeSpec::Sphere { radius: 1.0 },
         pose: Pose::identity(),
@@ -242,7 +242,7 @@ pub fn body(id: u64, report_within_m: f64) -> BodySpec {
     }
 }
 
-/// Compares the verdicts there are with the truth; yields how many there are.
+/// Compares the existing verdicts with the truth; returns their number.
 fn judge(found: &[Option<bool>], truth: &[bool], what: &str) -> usize {
     for (pair, (said, collides)) in found.iter().zip(truth).enumerate() {
         let right = said.is_none_or(|said| said == *collides);
@@ -259,10 +259,10 @@ fn the_profile_rises_with_work() {
     rises_in_motion(&shapes, &courses);
 }
 
-/// Each budget from nothing, doubled until all is decided: no step is in vain.
+/// Budgets from a cold start, doubled until all pairs are decided: each step must decide more pairs.
 fn rises_cold(shapes: &[Arc<Shape>], courses: &[Course]) {
     let truth = truth(courses, shapes, &mut Walk::default());
-    // The sample has to be one.
+    // The sample must be mixed.
     let colliding = truth.iter().filter(|collides| **collides).count();
     let (least, most) = (PAIRS / 3, 2 * PAIRS / 3);
     assert!((least..=most).contains(&colliding), "{colliding}");
@@ -275,11 +275,11 @@ fn rises_cold(shapes: &[Arc<Shape>], courses: &[Course]) {
         assert!(now > decided, "{what}: {now} pairs after {decided}");
         (decided, units) = (now, 2 * units);
     }
-    // Fewer than four budgets would be no profile.
+    // With fewer than four budgets there would be no profile.
     assert!(units >= 16 * UNITS_MIN, "{units}");
 }
 
-/// The same budget each tick, a run for each budget: what counts is the share of a whole run.
+/// The same budget in each tick, one run per budget: the share of decided pairs over a whole run must rise.
 fn rises_in_motion(shapes: &[Arc<Shape>], courses: &[Course]) {
     let (mut moving, mut walk) = (courses.to_vec(), Walk::default());
     let truth = |_| {
@@ -302,7 +302,7 @@ fn rises_in_motion(shapes: &[Arc<Shape>], courses: &[Course]) {
         }
         let share = decided as f64 / (PAIRS * TICKS) as f64;
         let last = shares.last().copied().unwrap_or(0.0);
-        // Motion may favour the smaller budget for a tick or two: another pair has the turn there.
+        // For a tick or two motion may favour the smaller budget, since turns go to other pairs.
         assert!(share >= last - 0.01, "{what}: {share} after {last}");
         shares.push(share);
     }
@@ -332,7 +332,7 @@ fn without_a_limit_intervals_are_narrow() {
         let gap = Interval::new(row.gap_min_m, row.gap_max_m);
         let verdict = Verdict::from_code(row.verdict).unwrap();
         let what = format!("seed {seed}, pair {pair}: {verdict}, {gap:?}");
-        // They are apart, all nearer than what is reported: not `possible`.
+        // The pairs are apart and within the report distance: near, not `possible`.
         assert_eq!(verdict, Verdict::Near, "{what}");
         assert!(gap.width() <= 1e-9 * DIAMETER_M, "{what}");
         let twin = courses[pair].twin(&shapes, Goal::Gap, &mut walk);

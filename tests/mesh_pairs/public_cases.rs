@@ -1,9 +1,9 @@
-//! The public cases that have a mesh, by an engine without a limit and by a query on its own, against their truth of 50
-//! digits.
+//! The public cases with a mesh, solved by an engine without a limit and by a single query, compared with their
+//! 50-digit truth.
 //!
-//! Method: scored as `tests/geometry_cases.rs` scores them, which asks triangle by triangle without a tree. Both ways
-//! round, with the mesh as a surface and as what its topology makes of it (no case has a shape within another, so their
-//! gaps are the same), and with the mesh of a box or of a hull in its place.
+//! Method: scored as in `tests/geometry_cases.rs`, which tests triangle by triangle without a tree. In both orders,
+//! with the mesh as a surface and as by default from its topology (no case has one shape inside another, so the gaps
+//! are equal), and with boxes and hulls replaced by their meshes.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -23,11 +23,11 @@ use sweepd::wire::Verdict;
 use sweepd::world::{Parts, PlacedShape};
 
 const CASES: &str = include_str!("../data/cases_public.jsonl");
-/// So many of them have a mesh.
+/// Least number of cases with a mesh.
 const CASES_MIN: usize = 13;
-/// And of so many the other shape has a mesh, too.
+/// Least number of cases with two meshes.
 const OF_TWO_MESHES_MIN: usize = 4;
-/// Pairs nearer than this are reported with their intervals, metres: all the cases are.
+/// Pairs nearer than this are reported with their intervals, metres: all cases are.
 const REPORT_M: f64 = 2.0;
 
 /// A case that has a mesh.
@@ -35,20 +35,20 @@ struct Case {
     id: String,
     specs: [ShapeSpec; 2],
     poses: [Pose; 2],
-    /// The true gap, metres; `None`: a surface is crossed.
+    /// The true gap, metres; `None`: the surfaces cross.
     truth: Option<Interval>,
-    /// The two touch within rounding: either verdict is right.
+    /// Whether the two touch within rounding errors: then either verdict is right.
     touching: bool,
     overlapping: bool,
-    /// Of the larger shape, metres.
+    /// Size of the larger shape, metres.
     size: f64,
-    /// Greatest error of the gap, as a part of the size.
+    /// Greatest error of the gap, relative to the size.
     error_max: f64,
-    /// Greatest width of its interval, as a part of the size.
+    /// Greatest width of the interval, relative to the size.
     width_max: f64,
 }
 
-/// What is said of a case.
+/// The computed result of a case.
 #[derive(Debug)]
 struct Said {
     apart: bool,
@@ -67,7 +67,7 @@ fn pose(value: &Value) -> Pose {
 }
 
 impl Case {
-    /// `None`: it has no mesh.
+    /// Reads a case; `None`: it has no mesh.
     fn read(line: &str) -> Option<Self> {
         let value: Value = serde_json::from_str(line).unwrap();
         let sides = [&value["a"], &value["b"]];
@@ -112,7 +112,7 @@ impl Case {
         let off_m = (truth.min - said.best_m).max(said.best_m - truth.max);
         let scale = size.max(truth.min.abs());
         assert!(off_m <= self.error_max * scale, "{what}");
-        // Nearer to touching, nothing is asked of the sign.
+        // Closer to contact the sign is not checked.
         if truth.min.abs() > 1e-5 * size && !self.touching {
             let right = (said.colliding, said.apart) == (self.overlapping, !self.overlapping);
             assert!(right, "{what}");
@@ -120,7 +120,7 @@ impl Case {
     }
 }
 
-/// What a side of a case is built as: a mesh as a surface and as by default; a polytope also as its mesh.
+/// The shapes that one side of a case is built as: a mesh as a surface and as by default; a polytope also as its mesh.
 fn forms(spec: &ShapeSpec) -> Vec<Arc<Shape>> {
     let built = |spec: &ShapeSpec| build(spec, Path::new(".")).unwrap().shape;
     let twin = match spec {
@@ -148,7 +148,7 @@ fn is_mesh(shape: &Shape) -> bool {
     matches!(shape.geometry, Geometry::Mesh(_))
 }
 
-/// A scene of two bodies, and one tick of it without a limit.
+/// Runs one tick of a scene of two bodies without a limit.
 fn by_engine([a, b]: [&Arc<Shape>; 2], poses: [&Pose; 2]) -> Said {
     let scene = Scene {
         sources: vec![SourceSpec {
@@ -180,7 +180,7 @@ fn by_engine([a, b]: [&Arc<Shape>; 2], poses: [&Pose; 2]) -> Said {
     }
 }
 
-/// A query at one pose, to its end.
+/// Runs one query at one pose to its end.
 fn by_query([a, b]: [&Shape; 2], poses: [&Pose; 2]) -> Said {
     let clock = ManualClock::new(0);
     let mut meter = Meter::unlimited(&clock);

@@ -8,7 +8,7 @@ use sweepd::narrow::mesh::{FrontStore, Goal, MeshQuery, Walk, Witness, retest_wi
 use sweepd::shape::{Convex, Geometry, Mesh, Shape};
 use sweepd::time::{ManualClock, Meter};
 
-/// Cases of each kind: what dev can bear, or what the law asks for.
+/// Cases of each kind: few in debug builds, the number required by the laws in release.
 pub const CASES: u64 = if cfg!(debug_assertions) { 12 } else { 300 };
 
 pub fn shape(soup: &Soup, solid: Option<bool>) -> Shape {
@@ -21,7 +21,7 @@ pub fn shape(soup: &Soup, solid: Option<bool>) -> Shape {
     }
 }
 
-/// A convex shape and the closed mesh that it is, for the oracle.
+/// A convex shape.
 pub fn convex(convex: Convex) -> Shape {
     Shape {
         aabb: convex.aabb_at(&Pose::identity()),
@@ -31,7 +31,8 @@ pub fn convex(convex: Convex) -> Shape {
     }
 }
 
-/// The mesh of a convex shape: its own faces where it is a box or a tetrahedron (by its supports), else a triangle.
+/// The mesh of a shape for the oracle, and whether it is solid: that of a box (no vertices), a triangle or a
+/// tetrahedron.
 pub fn as_mesh(shape: &Shape) -> (Vec<Point>, Vec<[u32; 3]>, bool) {
     let Geometry::Convex(convex) = &shape.geometry else {
         let mesh = mesh_of(shape);
@@ -120,7 +121,7 @@ impl Resumable for (FrontStore, MeshQuery) {
     }
 }
 
-/// Runs both kinds of queries in slices of one unit, checks every interruption, and yields where they ended.
+/// Runs both kinds of queries in slices of one unit, checks every interruption, and returns the final interval.
 pub fn run(a: &Shape, b: &Shape, pose_a: &Pose, pose_b: &Pose, goal: Goal, what: &str) -> Interval {
     let pos12 = relative(pose_a, pose_b);
     let mut walk = Walk::default();
@@ -215,7 +216,7 @@ fn follow(
     if let Some(w) = query.witness().filter(|w| w.closest.best_m > 0.0) {
         let again = retest_witness(a, b, &pos12, w.triangle_a, w.triangle_b).unwrap();
         assert_eq!(again.gap.max, w.closest.gap.max, "{what}");
-        // Of what touches no more is asked than a proof that it does not.
+        // For a leaf pair that touches only a proof that it does not is attempted.
         if w.closest.gap.min > 0.0 {
             assert_eq!(again.gap.min, w.closest.gap.min, "{what}");
         }
@@ -223,7 +224,7 @@ fn follow(
     end
 }
 
-/// One mesh of `kind`, and its name.
+/// A mesh of `kind`, and its name.
 pub fn any_mesh(rng: &mut Rng, kind: usize) -> (Shape, &'static str) {
     let one = Vec3::new(1.0, 1.0, 1.0);
     let (soup, name) = match kind {
@@ -264,7 +265,7 @@ pub fn any_mesh(rng: &mut Rng, kind: usize) -> (Shape, &'static str) {
 
 pub const KINDS: usize = 12;
 
-/// What was closed before some of its faces were taken out, one of two kinds, and its name: a surface.
+/// A closed mesh without some of its faces, one of two kinds, and its name: a surface.
 pub fn holed(rng: &mut Rng, kind: usize) -> (Soup, &'static str) {
     match kind {
         0 => (meshes::open_box(Vec3::new(1.0, 0.8, 0.9)), "open box"),
@@ -272,7 +273,7 @@ pub fn holed(rng: &mut Rng, kind: usize) -> (Soup, &'static str) {
     }
 }
 
-/// Whether the name of a mesh or of a convex shape is that of a surface.
+/// Whether a mesh or convex shape of this name is a surface.
 pub fn is_surface(name: &str) -> bool {
     let surfaces = [
         "patch",
@@ -284,7 +285,7 @@ pub fn is_surface(name: &str) -> bool {
     surfaces.contains(&name)
 }
 
-/// One convex shape whose faces the oracle can have.
+/// A convex shape whose faces the oracle can build.
 pub fn any_convex(rng: &mut Rng) -> (Shape, &'static str) {
     match rng.below(3) {
         0 => {
@@ -306,7 +307,7 @@ pub fn any_convex(rng: &mut Rng) -> (Shape, &'static str) {
     }
 }
 
-/// Poses of a pair: generic, nearly touching (within 1 % of the size, either side), deep, contained.
+/// Poses of a pair: generic, nearly touching (within 1 % of the size, on either side), deep or contained.
 pub fn place(rng: &mut Rng, a: &Shape, b: &Shape, how: usize) -> (Pose, Pose) {
     let far = if rng.below(5) == 0 { 1e7 } else { 1.0 };
     let origin = rng.vector(far);
@@ -328,7 +329,7 @@ pub fn place(rng: &mut Rng, a: &Shape, b: &Shape, how: usize) -> (Pose, Pose) {
     if how == 1 {
         return (pose_a, at(rng.range(0.0, 0.5) * reach));
     }
-    // Towards the other, each time by almost all of what is proved free, until they nearly touch.
+    // Approaches the other, each time by almost all of the proved free distance, until they nearly touch.
     let mut distance = 1.1 * reach;
     for _ in 0..12 {
         if let Truth::Apart(d) = truth_of(a, b, &pose_a, &at(distance)) {
@@ -342,7 +343,7 @@ pub fn place(rng: &mut Rng, a: &Shape, b: &Shape, how: usize) -> (Pose, Pose) {
     )
 }
 
-/// Two meshes of any kinds, their poses, and both names.
+/// Two meshes of random kinds, their poses, and both names.
 pub fn any_two(rng: &mut Rng, how: usize) -> (Shape, Shape, [Pose; 2], String) {
     let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
     let ((a, name_a), (b, name_b)) = (any_mesh(rng, kind_a), any_mesh(rng, kind_b));
@@ -350,7 +351,7 @@ pub fn any_two(rng: &mut Rng, how: usize) -> (Shape, Shape, [Pose; 2], String) {
     (a, b, [pose_a, pose_b], format!("{name_a} - {name_b}"))
 }
 
-/// Which of the three ways of [`place`] is a case's turn.
+/// Which of the three ways of [`place`] a case uses.
 pub fn way(case: u64) -> usize {
     usize::try_from(case % 3).unwrap()
 }
@@ -364,7 +365,7 @@ pub fn sweep(seed: u64, how: usize, goal: Goal) {
         let end = run(&a, &b, &pose_a, &pose_b, goal, &what);
         overlapping += u64::from(end.min <= 0.0);
     }
-    // The sample has to be one: deep poses overlap, generic ones are mixed.
+    // The sample must be mixed: deep poses overlap, generic ones are of both kinds.
     assert!(
         how != 1 || 3 * overlapping > 2 * CASES,
         "{overlapping} overlap"

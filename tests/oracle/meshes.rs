@@ -1,11 +1,11 @@
-//! Small meshes for tests: solids, surfaces, shells in shells, slivers.
+//! Small meshes for tests: solids, surfaces, nested shells, slivers.
 
 use std::fmt::Write as _;
 
 use super::rng::Rng;
 use sweepd::math::{Point, Vec3};
 
-/// Vertices and faces, counter-clockwise seen from outside.
+/// Vertices and faces; the faces are counter-clockwise seen from outside.
 #[derive(Clone, Debug)]
 pub struct Soup {
     pub vertices: Vec<Point>,
@@ -46,7 +46,7 @@ impl Soup {
         self
     }
 
-    /// Without some of its faces, by place, and without the vertices that no other face names.
+    /// Removes some of its faces, given by index, and the vertices that no remaining face uses.
     pub fn without(self, mut is_gone: impl FnMut(usize) -> bool) -> Self {
         let (mut vertices, mut faces) = (Vec::new(), Vec::new());
         let mut places = vec![None; self.vertices.len()];
@@ -97,12 +97,12 @@ pub fn cuboid(half: Vec3) -> Soup {
     Soup::new(vertices, faces)
 }
 
-/// A cuboid without its lid, the side towards +z: a surface, however much it holds.
+/// A cuboid without its face towards +z: a surface, not a solid, although it is nearly closed.
 pub fn open_box(half: Vec3) -> Soup {
     cuboid(half).without(|face| face / 2 == 1)
 }
 
-/// The hull of a few points in general position: every triple with all others on one side.
+/// The convex hull of a few points in general position: the triples that have all other points on one side.
 pub fn hull(points: &[Vec3]) -> Soup {
     let mut faces = Vec::new();
     let n = points.len();
@@ -130,7 +130,7 @@ fn index(row: usize, column: usize, columns: usize) -> u32 {
     u32::try_from(row * columns + column).unwrap()
 }
 
-/// Around z; `rings` times `sides` quads.
+/// A torus around z of `rings` times `sides` quads.
 pub fn torus(radius: f64, tube: f64, rings: usize, sides: usize) -> Soup {
     let mut vertices = Vec::new();
     let mut faces = Vec::new();
@@ -175,13 +175,13 @@ pub fn bumpy_sphere(rows: usize, columns: usize, bump: f64) -> Soup {
     Soup::new(vertices, faces)
 }
 
-/// A bumpy sphere of which about every fifth face is out, the first one in any case: a surface with holes.
+/// A bumpy sphere without about every fifth face, and always without the first: a surface with holes.
 pub fn holed_sphere(rng: &mut Rng, rows: usize, columns: usize, bump: f64) -> Soup {
     let whole = bumpy_sphere(rows, columns, bump);
     whole.without(|face| face == 0 || rng.below(5) == 0)
 }
 
-/// An open, wavy sheet in x and y.
+/// An open wavy sheet over x and y.
 pub fn patch(rng: &mut Rng, cells: usize) -> Soup {
     let n = cells + 1;
     let mut vertices = Vec::new();
@@ -200,7 +200,7 @@ pub fn patch(rng: &mut Rng, cells: usize) -> Soup {
     Soup::new(vertices, faces)
 }
 
-/// A height field as a closed mesh: a sheet, walls and a floor at `-base`.
+/// A height field as a closed mesh: a sheet, side walls and a floor at `-base`.
 pub fn height_field(rng: &mut Rng, cells: usize, base: f64) -> Soup {
     let mut soup = patch(rng, cells);
     let n = cells + 1;
@@ -252,7 +252,7 @@ pub fn block_with_hole(outer: f64, inner: f64, height: f64) -> Soup {
     Soup::new(vertices, faces)
 }
 
-/// Long thin triangles in a fan: needles of a millionth of their length.
+/// A fan of long thin triangles, a millionth as wide as long.
 pub fn slivers(rng: &mut Rng) -> Soup {
     let mut vertices = Vec::new();
     let mut faces = Vec::new();

@@ -1,8 +1,8 @@
-//! Oracles: brute force on small meshes with exact predicates, written apart from the library's narrow phase.
+//! Oracles: brute force on small meshes with exact predicates, written independently of the library's narrow phase.
 //!
-//! How far each can be trusted: `crosses` and `winds` are exact for the corners as they are (crate `robust`);
-//! `distance` is the least over all features of all triangle pairs, right to some 1e-13 of the size; depths of solids
-//! are lower bounds (corners only).
+//! Accuracy: `crosses` and `winds` are exact for the given corners (crate `robust`); `distance` is the least over all
+//! features of all triangle pairs, with an error of about 1e-13 of the size; overlap depths of solids are lower bounds
+//! (corners only).
 #![allow(dead_code, reason = "each test binary uses its own part of the oracle")]
 
 pub mod meshes;
@@ -15,7 +15,7 @@ use sweepd::math::{Point, Pose, Vec3};
 /// Corners of a triangle, all in one frame.
 pub type Triangle = [Point; 3];
 
-/// A mesh placed: triangles in a frame shared by both sides of a pair.
+/// A mesh at a pose: triangles in a frame shared by both bodies of a pair.
 pub struct Placed {
     pub triangles: Vec<Triangle>,
     pub corners: Vec<Point>,
@@ -23,7 +23,7 @@ pub struct Placed {
 }
 
 impl Placed {
-    /// Triangles relative to `from` (world axes): far from the origin nothing is lost.
+    /// Triangles relative to `from`, with world axes, so that positions far from the origin lose no precision.
     pub fn new(
         vertices: &[Point],
         faces: &[[u32; 3]],
@@ -45,7 +45,7 @@ impl Placed {
         }
     }
 
-    /// Winding number of the surface round `p`, by signed crossings of a long segment that hits no edge.
+    /// Winding number of the surface around `p`, from the signed crossings of a long segment that meets no edge.
     pub fn winds(&self, p: &Point) -> i64 {
         let far = 1.0
             + self
@@ -54,7 +54,7 @@ impl Placed {
                 .map(|c| (c - p).norm())
                 .fold(0.0, f64::max)
                 * 3.0;
-        // Directions without any pattern; the first whose segment meets no edge or corner decides.
+        // Pseudo-random directions; the first whose segment meets no edge or corner is used.
         let mut rng = rng::Rng::new(77);
         for _ in 0..40 {
             let q = p + rng.direction() * far;
@@ -79,13 +79,13 @@ impl Placed {
                 continue;
             }
             if positive + negative < 3 || sp == 0.0 || sq == 0.0 {
-                // A degenerate triangle is no part of any surface that winds.
+                // A degenerate triangle contributes nothing to the winding number.
                 if (b - a).cross(&(c - a)).norm() == 0.0 {
                     continue;
                 }
                 return None;
             }
-            // Leaving through the outward side: from behind the face to before it.
+            // The segment leaves through the outward side: it goes from behind the face to its front.
             count += if sp < 0.0 { 1 } else { -1 };
         }
         Some(count)
@@ -104,7 +104,7 @@ impl Placed {
     }
 }
 
-/// Positive when `d` is before the face a, b, c (on the side of its normal); exact.
+/// Positive if `d` is in front of the face a, b, c (on the side of its normal); exact.
 pub fn orient(a: &Point, b: &Point, c: &Point, d: &Point) -> f64 {
     let to = |p: &Point| Coord3D {
         x: p.x,
@@ -114,16 +114,16 @@ pub fn orient(a: &Point, b: &Point, c: &Point, d: &Point) -> f64 {
     -robust::orient3d(to(a), to(b), to(c), to(d))
 }
 
-/// What is true of a pair.
+/// The true relation of a pair.
 #[derive(Debug, Clone, Copy)]
 pub enum Truth {
-    /// Surfaces are this far apart, and neither holds the other.
+    /// The surfaces are this far apart, and neither body contains the other.
     Apart(f64),
     /// They overlap; the gap is at most this (<= 0).
     Overlap(f64),
 }
 
-/// The truth of a pair of meshes, by brute force over everything.
+/// The truth for a pair of meshes, by brute force over all features.
 pub fn truth(a: &Placed, b: &Placed) -> Truth {
     let mut crossing = false;
     let mut distance = f64::INFINITY;
@@ -159,7 +159,7 @@ pub fn truth(a: &Placed, b: &Placed) -> Truth {
     }
 }
 
-/// Whether two triangles share a point, those in one plane left out; exact.
+/// Whether two triangles share a point, except for coplanar ones; exact.
 pub fn crosses(s: &Triangle, t: &Triangle) -> bool {
     let pierced = |face: &Triangle, other: &Triangle| {
         (0..3).any(|k| {
@@ -180,7 +180,8 @@ pub fn crosses(s: &Triangle, t: &Triangle) -> bool {
     pierced(s, t) || pierced(t, s)
 }
 
-/// Least translation that parts two crossing triangles: over all face normals of their Minkowski difference.
+/// Least translation that separates two crossing triangles: the least over the face normals of their Minkowski
+/// difference.
 pub fn least_overlap(s: &Triangle, t: &Triangle) -> f64 {
     let edges = |t: &Triangle| [t[1] - t[0], t[2] - t[1], t[0] - t[2]];
     let (es, et) = (edges(s), edges(t));
@@ -205,7 +206,7 @@ pub fn least_overlap(s: &Triangle, t: &Triangle) -> f64 {
     least.max(0.0)
 }
 
-/// Distance of two triangles that do not cross: every corner to the other's face, every edge to every edge.
+/// Distance of two triangles that do not cross: each corner to the other's face, each edge to each edge.
 pub fn triangle_distance(s: &Triangle, t: &Triangle) -> f64 {
     let mut least = f64::INFINITY;
     for p in s {
@@ -225,7 +226,7 @@ pub fn triangle_distance(s: &Triangle, t: &Triangle) -> f64 {
     least
 }
 
-/// Regions of a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
+/// Distance of a point to a triangle, by its Voronoi regions (Ericson, Real-Time Collision Detection, 5.1.5).
 pub fn point_triangle(p: &Point, [a, b, c]: &Triangle) -> f64 {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
@@ -256,7 +257,7 @@ fn point_segment(p: &Point, a: &Point, b: &Point) -> f64 {
     (p - (a + ab * t)).norm()
 }
 
-/// Clamped closest points (Ericson 5.1.9).
+/// Distance of two segments by clamped closest points (Ericson 5.1.9).
 fn segment_segment((p1, q1): (&Point, &Point), (p2, q2): (&Point, &Point)) -> f64 {
     let (d1, d2, r) = (q1 - p1, q2 - p2, p1 - p2);
     let (a, e, f) = (d1.norm_squared(), d2.norm_squared(), d2.dot(&r));
@@ -266,7 +267,8 @@ fn segment_segment((p1, q1): (&Point, &Point), (p2, q2): (&Point, &Point)) -> f6
     let (b, c) = (d1.dot(&d2), d1.dot(&r));
     let denominator = a * e - b * b;
     if denominator < 1e-4 * a * e {
-        // Nearly parallel: the formula below is noise, and the distance from a place on the one is a convex function.
+        // Nearly parallel: the formula below would be dominated by rounding. The distance from a point on the first
+        // segment is a convex function of its parameter, so a ternary search finds the minimum.
         let at = |s: f64| point_segment(&(p1 + d1 * s), p2, q2);
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..120 {

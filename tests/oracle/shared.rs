@@ -1,4 +1,4 @@
-//! What triangles share: all of one side against all of the other.
+//! Points shared by two sets of triangles, found by testing all pairs.
 
 use super::{Triangle, orient};
 use sweepd::math::{Point, Vec3};
@@ -7,9 +7,9 @@ fn bounds(t: &Triangle) -> (Point, Point) {
     (t[0].inf(&t[1]).inf(&t[2]), t[0].sup(&t[1]).sup(&t[2]))
 }
 
-/// Ends and middle of each segment that two triangles share.
+/// Calls `take` with the ends and the middle of each segment that two triangles share.
 pub fn crossings(a: &[Triangle], b: &[Triangle], mut take: impl FnMut(Point)) {
-    // Only what reaches into the box of all of the other.
+    // Only triangles that reach into the bounding box of the whole other set are tested.
     let all = |of: &[Triangle]| {
         let boxes = of.iter().map(bounds);
         boxes.reduce(|x, y| (x.0.inf(&y.0), x.1.sup(&y.1)))
@@ -40,7 +40,7 @@ pub fn crossings(a: &[Triangle], b: &[Triangle], mut take: impl FnMut(Point)) {
     }
 }
 
-/// Where edges of `other` pass through `face`; exact but for the place itself.
+/// Adds the points where edges of `other` pass through `face`; the decision is exact, the position is rounded.
 fn pierced(face: &Triangle, other: &Triangle, ends: &mut Vec<Point>) {
     for k in 0..3 {
         let (p, q) = (&other[k], &other[(k + 1) % 3]);

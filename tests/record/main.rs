@@ -1,6 +1,6 @@
-//! Goal: what a daemon was given and said is in its recording, a replay of it is equal bit by bit, and what was changed
-//! in it is found where it was changed. Method: daemon, door and clients in this process, a clock turned by hand, a
-//! scene and a run with everything that an engine can be given.
+//! Goal: the input and output of a daemon are in its recording, a replay is equal bit by bit, and a change to the
+//! recording is found where it was made. Method: daemon, door and clients in this process, a manual clock, and a scene
+//! and a run with every kind of input that an engine accepts.
 #![cfg(feature = "mcap")]
 #![allow(
     clippy::unwrap_used,
@@ -25,7 +25,7 @@ use sweepd::record::file::{Ending, McapSink, Medium};
 use sweepd::record::{Between, EditRecord, Origin, Sink, Start, TickRecord, TreeMark};
 use sweepd::wire::{PairRow, Verdict, pair_flags};
 
-/// Flips the last bit.
+/// Flips the last bit of a number.
 fn flip(x: &mut f64) {
     *x = f64::from_bits(x.to_bits() ^ 1);
 }
@@ -45,7 +45,7 @@ fn a_run_with_everything_replays_without_a_difference() {
         assert_eq!(all.len() as u64, told.ticks);
         is_rich(&all, units);
         assert!(told.contacts > 1_000 && told.answers > 50, "{told:?}");
-        // Nothing of it is read from the disk again.
+        // The replay must not read the meshes from disk again.
         folder.forget_meshes();
         let ticks = all.len() as u64;
         let (found, tally) = replay(&start, all);
@@ -98,7 +98,7 @@ fn one_changed_bit_of_a_pose_is_found_at_its_tick() {
         },
     );
     let (start, mut all) = records(&folder.file());
-    // The last pose of body 5 that its tick has taken, some ticks later.
+    // Finds the last pose of body 5 that was applied in its tick, some ticks later, and changes it.
     let hit = all.iter_mut().skip(80).find_map(|record| {
         let bodies = &record.out.bodies;
         let taken = bodies.iter().find(|row| row.body == 5)?.position;
@@ -186,7 +186,7 @@ fn ticks_limited_by_time_are_held_against_the_law_and_one_that_lies_is_found() {
     assert_eq!((tally.exact, tally.lawful), (0, ticks));
     let judged = tally.judged;
     assert!(judged.collisions > 1_000 && judged.open > 20, "{judged:?}");
-    // A collision is left out of the recording.
+    // A collision is removed from the recording.
     let mut lie = all.clone();
     let told = |row: &PairRow| row.verdict == Verdict::Colliding.code() && row.flags == 0;
     let record = lie
@@ -202,7 +202,7 @@ fn ticks_limited_by_time_are_held_against_the_law_and_one_that_lies_is_found() {
         (tick, "no row: apart"),
         "{found}"
     );
-    // An interval is moved to where the gap is not.
+    // An interval is moved so that it excludes the gap.
     let mut lie = all;
     let record = lie
         .iter_mut()
@@ -229,7 +229,7 @@ fn bug_by_the_law_another_tree_that_wears_first_is_no_difference() {
         },
     );
     let (start, mut all) = records(&folder.file());
-    // Which tree wears first depends on how far refits came in time: here one that no replay finds worn.
+    // Which tree wears first depends on when refits finished: here the recording names one that no replay finds worn.
     let of = TreeMark {
         body: 42,
         generation: 0,
@@ -241,7 +241,7 @@ fn bug_by_the_law_another_tree_that_wears_first_is_no_difference() {
     let (found, tally) = replay(&start, all);
     assert_eq!(found.map(|f| f.to_string()), None);
     assert_eq!(tally.lawful, ticks);
-    // Bit by bit it is one.
+    // In a bit-by-bit comparison this is a difference.
     play(
         &folder,
         &Play {
@@ -260,7 +260,7 @@ fn bug_by_the_law_another_tree_that_wears_first_is_no_difference() {
     assert_eq!(tally.exact, ticks - 11);
 }
 
-/// A disk with so many bytes left.
+/// A disk with `left` bytes of free space.
 struct Full {
     file: std::fs::File,
     left: usize,

@@ -1,5 +1,5 @@
-//! A run with everything that an engine can be given: meshes of files and of blobs, a cloth, a bullet, edits that are
-//! done and refused, settings, sources that die, fall silent and begin anew, poses that are none.
+//! A run with every kind of input that an engine accepts: meshes from files and from blobs, a cloth, a bullet, applied
+//! and refused edits, settings, sources that end, fall silent and restart, invalid poses.
 
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex};
@@ -18,13 +18,13 @@ const CELLS: u16 = 10;
 /// Time between two rounds of frames, nanoseconds.
 const FRAME_NS: u64 = 10_000_000;
 
-/// How to run it.
+/// Parameters of a run.
 pub struct Play<'a> {
     pub seed: u64,
     pub rounds: usize,
-    /// Work units of a tick.
+    /// Work units per tick.
     pub units: Option<u64>,
-    /// Time of a tick, nanoseconds, where each look at the clock takes so many.
+    /// Time per tick and duration of each clock read, nanoseconds.
     pub time_ns: Option<(u64, u64)>,
     pub sink: Option<&'a stage::Make<'a>>,
 }
@@ -41,7 +41,7 @@ impl Default for Play<'_> {
     }
 }
 
-/// What became of a run.
+/// Results of a run.
 #[derive(Debug, Default)]
 pub struct Told {
     pub ticks: u64,
@@ -120,7 +120,7 @@ fn cloth_mesh() -> (Vec<[f32; 3]>, Vec<[u16; 3]>) {
     (vertices, faces)
 }
 
-/// The cloth, wrung and pulled out more and more: its tree wears.
+/// The cloth, twisted and stretched more and more, so that its tree wears.
 fn cloth(round: usize) -> Vec<VertexRow> {
     let phase = (round % 200) as f32 / 200.0;
     let (stretch, height) = (1.0 + 2.0 * phase, 0.2 + 0.1 * (20.0 * phase).sin());
@@ -140,7 +140,7 @@ struct Cast {
     desk: MemoryLink,
     panel: stage::Panel,
     random: Rng,
-    /// By id, from 1.
+    /// Positions by id, from 1.
     places: Vec<[f64; 3]>,
     told: Told,
     asked: u64,
@@ -155,7 +155,7 @@ impl Cast {
         client
     }
 
-    /// Frames of a round, and what else happens in it.
+    /// Sends the frames of a round, and does the other events of this round.
     fn act(&mut self, round: usize) {
         if self.sim.is_none() {
             self.sim = Some(self.client("sim"));
@@ -173,7 +173,7 @@ impl Cast {
         }
         self.send_other(round);
         match round % 300 {
-            // The node of a source goes, and comes again as another session.
+            // The client of a source disconnects, and later reconnects with another session.
             85 => self.other = None,
             140 => self.sim.as_mut().unwrap().reset_epoch(),
             _ => {}
@@ -248,7 +248,7 @@ impl Cast {
         }
     }
 
-    /// A request now and then; answers are taken as they come.
+    /// Sends a request in some rounds; reads the answers that have come.
     fn edit(&mut self, round: usize) {
         let mut text = Vec::new();
         while self.desk.answer(&mut text).unwrap().is_some() {
@@ -331,7 +331,7 @@ impl Cast {
     }
 }
 
-/// Plays it into the folder's file.
+/// Runs it, and records it in the folder's file.
 pub fn play(folder: &Folder, play: &Play<'_>) -> Told {
     let (hub, clock) = (Hub::new(), Arc::new(ManualClock::new(1_000_000_000)));
     if let Some((_, step_ns)) = play.time_ns {
@@ -357,13 +357,13 @@ pub fn play(folder: &Folder, play: &Play<'_>) -> Told {
     let (mut round, mut calls) = (0, 0_usize);
     let ticks = stage::run(folder, &text, &hub, &clock, panel, play.sink, || {
         calls += 1;
-        // A server says hello with its first round; each frame has some rounds.
+        // The server says hello in its first round; each frame is followed by several rounds.
         if calls > 1 && calls % 4 == 0 && round < play.rounds {
             clock.advance(FRAME_NS);
             cast.act(round);
             round += 1;
         }
-        // The worker has time of its own.
+        // Gives the worker thread time to run.
         if calls % 64 == 0 {
             std::thread::yield_now();
         }

@@ -1,4 +1,4 @@
-//! A daemon over memory that records, and what its recording holds.
+//! A recording daemon over memory, and the content of its recording.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,7 +16,7 @@ use sweepd::transport::memory::{Hub, MemoryServer};
 use sweepd::transport::{BodyChange, Door, RequestToken, Setting, Wake};
 use sweepd::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow, Undelivered};
 
-/// A folder for a recording and the meshes of a scene; it goes when it is dropped.
+/// A folder for a recording and the meshes of a scene; deleted on drop.
 pub struct Folder(PathBuf);
 
 static NUMBERS: AtomicU64 = AtomicU64::new(0);
@@ -42,7 +42,7 @@ impl Folder {
         self.0.join("run.mcap")
     }
 
-    /// What is built from now on is not built of these.
+    /// Deletes the mesh files, so that nothing can be built from them any more.
     pub fn forget_meshes(&self) {
         for mesh in ["wedge.stl", "wedge.obj"] {
             std::fs::remove_file(self.0.join(mesh)).unwrap();
@@ -56,7 +56,7 @@ impl Drop for Folder {
     }
 }
 
-/// What an operator sets, from outside of the daemon.
+/// Settings that an operator makes from outside the daemon.
 pub type Panel = Arc<Mutex<Vec<Setting>>>;
 
 /// A door over memory with an operator.
@@ -101,13 +101,13 @@ impl Door for Desk {
     }
 }
 
-/// Makes where a recording goes, of its start.
+/// Makes the sink of a recording from its start record.
 pub type Make<'a> = dyn Fn(&Start) -> Box<dyn Sink> + 'a;
 
-/// Runs a recording daemon; returns its ticks.
+/// Runs a recording daemon; returns its number of ticks.
 ///
-/// * `sink` - where the recording goes; `None`: the folder's file.
-/// * `drive` - is called after each round until it says that all is done.
+/// * `sink` - makes the sink of the recording; `None`: the folder's file.
+/// * `drive` - called after each round until it returns true.
 pub fn run(
     folder: &Folder,
     text: &str,
@@ -142,14 +142,14 @@ pub fn run(
     ticks
 }
 
-/// All that a recording holds.
+/// The whole content of a complete recording.
 pub fn records(path: &Path) -> (Start, Vec<TickRecord>) {
     let (start, all, ending) = ended(path);
     assert_eq!(ending, Ending::Whole);
     (start, all)
 }
 
-/// All that a recording holds, and how it ends.
+/// The whole content of a recording, and how it ends.
 pub fn ended(path: &Path) -> (Start, Vec<TickRecord>, Ending) {
     let (mut reader, start) = Reader::open(path).unwrap();
     let mut all = Vec::new();

@@ -1,4 +1,4 @@
-//! Splitting regions is work like any other: none of it at budget 0, counted, and the regions tighten with it.
+//! Splitting regions is work like any other: with budget 0 there is none, it is counted, and it makes regions smaller.
 
 use sweepd::limits::REGION_TESTS_PER_PAIR;
 use sweepd::math::{Pose, Vec3};
@@ -16,7 +16,7 @@ fn at_budget_0_no_test_is_done_and_the_union_still_holds_all_that_is_shared() {
         let kind = [0, 1, 2, 4, 6, 7][rng.below(6)];
         let things = things(&mut rng, kind);
         let mut run = Run::new(&things, &place(&mut rng, &things));
-        // A front of some depth, at other poses.
+        // Gives the front some depth, at other poses.
         let units = [0, 10, 100, 1_000_000][rng.below(4)];
         run.send(Budget::units(units));
         for tick in 0..4 {
@@ -29,7 +29,7 @@ fn at_budget_0_no_test_is_done_and_the_union_still_holds_all_that_is_shared() {
     assert!(points as u64 > 10 * CASES, "{points} points");
 }
 
-/// A bumpy ball that a floor cuts: nothing but splitting narrows its regions.
+/// A bumpy ball cut by a floor: only splitting makes its regions smaller.
 fn on_a_floor() -> ([Thing; 2], [Pose; 2]) {
     let ball = Part::Mesh(meshes::bumpy_sphere(12, 16, 0.1));
     let one = |part| Thing::new(vec![(part, Vec3::zeros())]);
@@ -69,7 +69,7 @@ fn regions_tighten_with_the_budget_and_never_take_more_than_it() {
         let height = rng.range(0.3, 0.9);
         poses[1] = rng.pose(Vec3::z() * height);
         let whole = Run::new(&things, &poses).send(Budget::UNLIMITED).tick.units;
-        // All but splitting is done from here on.
+        // With this many units everything except splitting is done.
         let rest = whole.saturating_sub(MOST);
         for (sum, extra) in sums.iter_mut().zip([0, MOST / 8, MOST / 4, MOST / 2, MOST]) {
             let units = if extra == 0 { 0 } else { rest + extra };
@@ -78,7 +78,7 @@ fn regions_tighten_with_the_budget_and_never_take_more_than_it() {
             *sum += widest(&out, &things);
         }
     }
-    // Eight spheres round a disc get no smaller in the end.
+    // In the end the radius of eight spheres that cover a disc no longer decreases.
     assert!(sums.is_sorted_by(|x, y| 1.01 * x >= *y), "{sums:?}");
     assert!(sums[1] < 0.7 * sums[0], "{sums:?}");
 }
@@ -101,7 +101,7 @@ fn of_a_budget_that_does_not_reach_for_the_verdict_an_eighth_goes_to_regions() {
                 &things,
             )
         };
-        // With 7 units an eighth is none.
+        // An eighth of 7 units is 0, so that nothing is split.
         (cut, whole) = (cut + radius(7), whole + radius(64));
     }
     assert!(whole < 0.9 * cut, "{whole} against {cut}");
@@ -114,7 +114,7 @@ fn a_pair_at_rest_keeps_what_splitting_has_made_when_there_is_no_budget_left() {
     let fine = run.send(Budget::UNLIMITED).regions;
     let out = run.send(Budget::units(0));
     assert_eq!((out.regions, out.tick.units), (fine.clone(), 0));
-    // All is done: nothing more is spent.
+    // Everything is done: no further units are spent.
     let out = run.send(Budget::UNLIMITED);
     assert_eq!((out.regions, out.tick.units), (fine, 0));
 }

@@ -1,6 +1,7 @@
-//! Goal: the union of a pair's regions holds every point that the two share, at any budget, in motion, whatever the
-//! shapes; the regions are few, tighten with work, and their cones hold the normals of the exact manifold.
-//! Method: scenes of two bodies through the engine, cut off at random budgets tick by tick, against brute force over
+//! Goal: the union of a pair's regions contains every point that the two share, at any budget, in motion, for all
+//! shapes; the regions are few, shrink with work, and their cones contain the normals of the exact manifold. Method:
+//! scenes of two bodies in the engine, cut off at a random budget in each tick, compared with brute force over
+//! triangles (`truth`), and with an engine without a limit at the same poses.
 //! triangles (`truth`), and against an engine without a limit at the same poses.
 #![allow(
     clippy::unwrap_used,
@@ -68,11 +69,11 @@ fn cuboid(rng: &mut Rng) -> Part {
     ))
 }
 
-/// Two bodies of a kind of pair.
+/// Two bodies for a kind of pair.
 fn things(rng: &mut Rng, kind: usize) -> [Thing; 2] {
     let single = |part: Part| Thing::new(vec![(part, Vec3::zeros())]);
     match kind {
-        // Mesh and mesh, half of all.
+        // Two meshes: half of all kinds.
         0..=3 => {
             let size = rng.range(0.2, 1.0);
             let mut small = mesh(rng);
@@ -122,7 +123,8 @@ fn scene(things: &[Thing; 2], poses: &[Pose; 2]) -> String {
     text
 }
 
-/// Poses in contact: a third deep or contained, a third within 1 % of touching, the rest anywhere; some far away.
+/// Poses in contact: a third deep or contained, a third within 1 % of touching, the rest arbitrary; some far from the
+/// origin.
 fn place(rng: &mut Rng, things: &[Thing; 2]) -> [Pose; 2] {
     let floor = matches!(things[0].parts[0].0, Part::Floor);
     let far = if !floor && rng.below(4) == 0 {
@@ -174,7 +176,7 @@ fn point(row: [f64; 3]) -> Point {
     Point::from(Vec3::from(row))
 }
 
-/// Whether a point, relative to `from`, is in one of the regions.
+/// Whether a point relative to `from` is in one of the regions.
 fn inside(regions: &[RegionRow], p: &Point, from: &Vec3, slack: f64) -> bool {
     regions.iter().any(|row| {
         let centre = point(row.centre) - from;
@@ -217,7 +219,7 @@ impl Run {
         out
     }
 
-    /// Checks a tick; returns points checked.
+    /// Checks a tick; returns the number of points checked.
     fn check(&self, out: &Outbox, what: &str) -> usize {
         let from = self.poses[0].translation.vector;
         let sides = [
@@ -259,13 +261,13 @@ impl Run {
         let open = out.pairs.iter().any(|row| {
             row.verdict == Verdict::Possible.code() || row.verdict == Verdict::Colliding.code()
         });
-        // One that is possible may have none: a look at its boxes has shown that they are apart.
+        // A possible pair may have no regions, if tests of its boxes have proved it apart.
         assert!(open || regions.is_empty(), "{what}");
         let slack = 1e-9 * (self.things[0].radius + self.things[1].radius);
         let mut count = 0;
         let all = shared(sides[0], sides[1], &from);
         for (p, convex) in &all {
-            // Of a finished pair of convex shapes the contacts count.
+            // For a finished pair of convex shapes the regions cover the contacts instead.
             if *convex && complete {
                 continue;
             }
@@ -304,7 +306,7 @@ impl Run {
     }
 }
 
-/// What touches said nothing any more of what lies within: one surface of a mesh can touch, another be held as a whole.
+/// Once one surface of a mesh touched, another surface wholly inside the other body was omitted.
 #[test]
 fn bug_a_surface_within_the_other_was_left_out_once_another_one_touched() {
     let small = || meshes::cuboid(Vec3::repeat(0.1));
@@ -336,7 +338,7 @@ fn bug_a_surface_within_the_other_was_left_out_once_another_one_touched() {
     assert!(complete > 0 && cut > 0, "{complete} {cut}");
 }
 
-/// A mesh that deforms, and anything.
+/// A deforming mesh and a body of any kind.
 fn bending(rng: &mut Rng) -> [Thing; 2] {
     let soft = |rng: &mut Rng| {
         let soup = match rng.below(3) {
@@ -414,7 +416,7 @@ fn regions_of_meshes_that_deform_hold_all_that_is_shared_at_any_budget() {
     sweep_of(30_000, bending);
 }
 
-/// The largest radius, over the mean of the two radii.
+/// The largest radius, relative to the mean radius of the two bodies.
 fn widest(out: &Outbox, things: &[Thing; 2]) -> f64 {
     let largest = out
         .regions
@@ -426,7 +428,7 @@ fn widest(out: &Outbox, things: &[Thing; 2]) -> f64 {
 
 #[test]
 fn regions_get_smaller_with_work() {
-    // A mean over a handful of pairs says nothing: as many in every build.
+    // The mean of a few pairs has no meaning, so debug builds use as many as release.
     let mut sums = [0.0; 6];
     let mut count = 0;
     for case in 0..300 {
@@ -449,13 +451,14 @@ fn regions_get_smaller_with_work() {
         sums.map(|s| s / f64::from(count))
     );
     assert!(count > 150, "{count} pairs");
-    // What the roots share, cut evenly, is about as small as the first few boxes of a front.
+    // The intersection of the root boxes, divided evenly, is about as small as the first few boxes of a front.
     assert!(sums[1] <= 1.02 * sums[0], "{sums:?}");
     for pair in sums[1..5].windows(2) {
-        // But for a shell that may lie within: of several that is asked once the two touch.
+        // A shell that may be inside is an exception: if there are several, it is tested only after the two touch.
         assert!(pair[1] <= 1.01 * pair[0], "{sums:?}");
     }
-    // What is complete holds the points of the manifold too, and these can lie deeper than what the surfaces share.
+    // Complete regions also contain the points of the manifold, which can be deeper than the shared points of the
+    // surfaces.
     assert!(sums[5] <= 1.05 * sums[4], "{sums:?}");
 }
 
@@ -517,7 +520,7 @@ fn a_pair_of_unknown_place_has_one_region_as_large_as_its_boxes_or_none_at_all()
     let at = |x: f64| Pose::translation(x, 0.0, 0.0);
     let mut run = Run::new(&things, &[at(0.0), at(0.8)]);
     run.send(Budget::UNLIMITED);
-    // No frame for longer than the time-out: what the two share is not known any more.
+    // No frame for longer than the timeout: the shared points are unknown from then on.
     for _ in 0..60 {
         run.drive.idle(Budget::UNLIMITED, ASKED);
     }
@@ -579,7 +582,7 @@ fn a_complete_pair_at_rest_keeps_its_regions_and_a_moved_one_does_not() {
     let first = run.send(Budget::UNLIMITED).regions;
     assert!(first.iter().all(|row| row.flags == region_flags::COMPLETE) && !first.is_empty());
     assert_eq!(run.send(Budget::UNLIMITED).regions, first);
-    // Nothing is left to find out, so nothing is spent, and what is known stays.
+    // There is no work left, so no units are spent, and the regions stay.
     assert_eq!(run.send(Budget::units(0)).regions, first);
     for _ in 0..20 {
         run.poses[1] = moved(&mut rng, &at(1.5), 1.0);

@@ -1,6 +1,6 @@
-//! Goal: approximate contacts are good enough to drive a response. Method: two bodies of meshes that overlap by a fifth
-//! of their diameter, under a tenth of the work that all of it takes; one of them goes where the guess of the deepest
-//! region says, tick by tick, and nothing else is asked. A twin without a limit says how far they overlap still.
+//! Goal: approximate contacts are good enough for a response. Method: two bodies of meshes that overlap by a fifth of
+//! their diameter, with a tenth of the work units of a full query; in each tick one of them moves according to the
+//! estimate of the deepest region, and nothing else is used. A twin without a limit measures the remaining overlap.
 
 use std::collections::BTreeMap;
 
@@ -12,15 +12,15 @@ use super::oracle::rng::Rng;
 use super::{ASKED, Part, Run, Thing, meshes};
 
 const SEEDS: u64 = if cfg!(debug_assertions) { 3 } else { 16 };
-/// Ticks in which they are to be apart, or nearly.
+/// Most ticks until they are apart, or nearly.
 const TICKS: usize = 40;
-/// One part of so many of the work is the budget.
+/// Divisor of the work of a full query, which gives the budget.
 const PARTS: u64 = 10;
-/// What the two overlap by at first, as a share of the diameter.
+/// Initial overlap, as a share of the diameter.
 const OVERLAP: f64 = 0.2;
-/// What the two may still overlap by in the end, as a share of the diameter.
+/// Allowed final overlap, as a share of the diameter.
 const TOUCH: f64 = 0.01;
-/// Halvings that say how far they overlap.
+/// Bisection steps to measure an overlap.
 const HALVINGS: usize = 14;
 
 const VERDICTS: Demand = Demand {
@@ -29,7 +29,7 @@ const VERDICTS: Demand = Demand {
     ..ASKED
 };
 
-/// A closed box whose sides are cut into `cells` by `cells` squares.
+/// A closed box whose sides are divided into `cells` by `cells` squares.
 fn fine_cuboid(half: Vec3, cells: u32) -> meshes::Soup {
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
     let mut names: BTreeMap<[u32; 3], u32> = BTreeMap::new();
@@ -78,7 +78,8 @@ fn collide(twin: &mut Run, poses: &[Pose; 2]) -> bool {
     tick.colliding > 0
 }
 
-/// How far the second has to go straight away from the first until the two are apart, metres; 0: they are.
+/// The distance that the second body must move straight away from the first until they are apart, metres; 0: they are
+/// apart.
 fn overlap_m(twin: &mut Run, poses: &[Pose; 2]) -> f64 {
     if !collide(twin, poses) {
         return 0.0;
@@ -97,7 +98,7 @@ fn overlap_m(twin: &mut Run, poses: &[Pose; 2]) -> f64 {
     high
 }
 
-/// Whether it is told that the contacts are not all known: no region is of a complete pair, and no contact is exact.
+/// Whether the output shows that contacts are incomplete: no region is of a complete pair, and no contact is exact.
 fn is_cut_off(out: &Outbox) -> bool {
     let complete = |flags: u32| flags & region_flags::COMPLETE != 0;
     let exact = |flags: u32| flags & contact_flags::ESTIMATE == 0;
@@ -106,8 +107,8 @@ fn is_cut_off(out: &Outbox) -> bool {
         && !out.contacts.iter().any(|row| exact(row.flags))
 }
 
-/// Where a body is to go by the deepest guess: by half of its depth along its normal, which leads from A to B, if it is
-/// B, and against it if it is A.
+/// Motion of a body according to the deepest estimate: half of its depth along its normal, which points from A to B,
+/// with the sign for this body.
 fn push(out: &Outbox, body: u64) -> Option<Vec3> {
     let regions = out.regions.iter();
     let deepest = regions.max_by(|x, y| x.depth_m.total_cmp(&y.depth_m))?;
@@ -115,7 +116,7 @@ fn push(out: &Outbox, body: u64) -> Option<Vec3> {
     Some(Vec3::from(deepest.normal) * (0.5 * sign * deepest.depth_m))
 }
 
-/// Two that overlap, the second in a random direction from the first.
+/// Overlapping poses, with the second body in a random direction from the first.
 fn overlapping(rng: &mut Rng, things: &[Thing; 2]) -> [Pose; 2] {
     let middle = rng.vector(5.0);
     let (a, turn, away) = (rng.pose(middle), rng.rotation(), rng.direction());
@@ -128,8 +129,8 @@ fn overlapping(rng: &mut Rng, things: &[Thing; 2]) -> [Pose; 2] {
     [a, put(apart_m - OVERLAP * diameter_m)]
 }
 
-/// Lets one of the two respond until they are apart or nearly; returns ticks, and in how many of them contacts were cut
-/// off.
+/// Lets one of the two respond until they are apart or nearly; returns the number of ticks, and how many of them had
+/// incomplete contacts.
 fn respond(run: &mut Run, twin: &mut Run, moving: usize, what: &str) -> (usize, usize) {
     let body = run.drive.rows_mut()[moving].body;
     let work = Run::new(&run.things, &run.poses).send(Budget::UNLIMITED);

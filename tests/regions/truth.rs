@@ -1,5 +1,5 @@
-//! What two bodies truly share, by brute force over triangles, corners and planes: no tree, no front, no box of the
-//! library's.
+//! The points that two bodies truly share, by brute force over triangles, vertices and planes, without any tree, front
+//! or box of the library.
 
 use crate::oracle::meshes::{Soup, cuboid, trimesh};
 use crate::oracle::shared::crossings;
@@ -9,16 +9,16 @@ use sweepd::math::{Point, Pose, Vec3};
 /// One shape of a body, at the body's own origin.
 #[derive(Clone)]
 pub enum Part {
-    /// Triangles; their inside does not count.
+    /// Triangles; the inside does not count.
     Mesh(Soup),
-    /// A convex box, inside and all.
+    /// A convex box; the inside counts.
     Box(Vec3),
-    /// All below z = 0.
+    /// The half-space z <= 0.
     Floor,
 }
 
 impl Part {
-    /// As a shape of a scene file, at a place.
+    /// The shape as text of a scene file, at a position in the body.
     pub fn text(&self, at: Vec3) -> String {
         let position = format!("position = [{:?}, {:?}, {:?}]", at.x, at.y, at.z);
         match self {
@@ -48,7 +48,7 @@ impl Part {
         !matches!(self, Self::Mesh(_))
     }
 
-    /// Whether a point of its own frame is in it, where its inside counts.
+    /// Whether a point of its own frame is inside, for parts whose inside counts.
     fn holds(&self, p: &Point) -> bool {
         match self {
             Self::Mesh(_) => false,
@@ -58,12 +58,12 @@ impl Part {
     }
 }
 
-/// A body: its shapes and where they are in it.
+/// A body: its shapes and their positions in it.
 #[derive(Clone)]
 pub struct Thing {
     pub parts: Vec<(Part, Vec3)>,
     pub radius: f64,
-    /// Its one mesh deforms.
+    /// Whether its only mesh deforms.
     pub deforms: bool,
 }
 
@@ -83,7 +83,7 @@ impl Thing {
         }
     }
 
-    /// Takes the vertices of its one mesh.
+    /// Sets the vertices of its only mesh.
     pub fn bend(&mut self, vertices: &[[f32; 3]]) {
         if let [(Part::Mesh(soup), _)] = &mut self.parts[..] {
             let point = |v: &[f32; 3]| Point::from(v.map(f64::from));
@@ -97,9 +97,9 @@ impl Thing {
     }
 }
 
-/// Every point known to be shared: ends and middles of what triangles share, corners of one inside the other.
+/// All known shared points: ends and middles of the segments that triangles share, vertices of one inside the other.
 ///
-/// * returns - points relative to `from`, world axes; and whether both parts of each were convex.
+/// * returns - points relative to `from`, world axes; and whether both parts of a point are convex.
 pub fn shared(a: (&Thing, &Pose), b: (&Thing, &Pose), from: &Vec3) -> Vec<(Point, bool)> {
     let mut all = Vec::new();
     for (one, at_one) in &a.0.parts {
@@ -135,7 +135,7 @@ pub fn shared(a: (&Thing, &Pose), b: (&Thing, &Pose), from: &Vec3) -> Vec<(Point
     all
 }
 
-/// Corners of a mesh's surface within a solid, where no triangles cross: what is held as a whole.
+/// Vertices of a mesh inside a solid, used where no triangles cross: the mesh is wholly inside.
 pub fn held(a: (&Thing, &Pose), b: (&Thing, &Pose), from: &Vec3) -> Vec<Point> {
     let place = |(thing, pose): (&Thing, &Pose)| match &thing.parts[..] {
         [(part, at)] if at.norm() == 0.0 => part.soup().map(|soup| {
@@ -155,7 +155,7 @@ pub fn held(a: (&Thing, &Pose), b: (&Thing, &Pose), from: &Vec3) -> Vec<Point> {
     all
 }
 
-/// Whether each edge has two faces, once each way.
+/// Whether each edge has two faces, once in each direction.
 fn closed(soup: &Soup) -> bool {
     let mut edges: Vec<(u32, u32)> = (soup.faces.iter())
         .flat_map(|f| [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])])

@@ -1,7 +1,7 @@
-//! Goal: the Rust structs and codes are those of the ROS 2 interfaces: field names, types, order, constants.
-//! Method: `data/ros2_types.txt` has every type as rosidl's JSON type descriptions say (a ROS 2 test holds it against
-//! the generator); each struct is traced through serde, as CDR reads it, and compared with it. Constants are read from
-//! the interface files and compared with the codes of the wire.
+//! Goal: the Rust structs and codes equal those of the ROS 2 interfaces: field names, types, order, constants. Method:
+//! `data/ros2_types.txt` has every type according to rosidl's JSON type descriptions (a ROS 2 test compares it with the
+//! generator); each struct is traced through serde, as CDR reads it, and compared with this file. Constants are read
+//! from the interface files and compared with the codes of the wire.
 #![cfg(feature = "ros2")]
 #![allow(
     clippy::unwrap_used,
@@ -22,7 +22,7 @@ use sweepd::wire::{
 };
 use trace::{Kind, trace};
 
-/// Where the interfaces are.
+/// Folder of the interfaces.
 fn package() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("msgs/sweepd_msgs")
 }
@@ -41,7 +41,7 @@ fn constants(file: &str) -> BTreeMap<String, u64> {
     all
 }
 
-/// Words of codes as constants: `source lost` is `SOURCE_LOST`.
+/// Words of codes as names of constants: `source lost` becomes `SOURCE_LOST`.
 fn named<'a>(
     prefix: &'a str,
     codes: impl Iterator<Item = (&'static str, u64)> + 'a,
@@ -71,7 +71,7 @@ fn flags_of_pairs() -> [(&'static str, u64); 8] {
     ]
 }
 
-/// Codes of the wire, by the names that constants of an interface have.
+/// Codes of the wire per interface, by the names of the constants.
 type Codes = Vec<(&'static str, BTreeMap<String, u64>)>;
 
 fn bits(
@@ -105,7 +105,7 @@ fn codes_of_messages() -> Codes {
         ),
         (
             "msg/Contact.msg",
-            // Of `contact_changes`, which is not told over ROS 2.
+            // `GONE` is for `contact_changes`, which ROS 2 does not have.
             named("", codes!(ContactKind))
                 .filter(|(name, _)| name != "GONE")
                 .chain(named(
@@ -191,7 +191,7 @@ fn the_constants_of_the_interfaces_are_the_codes_of_the_wire() {
     }
 }
 
-/// A type by its name: fields with their types, in order.
+/// Types by name: fields with their types, in order.
 type Described = BTreeMap<String, Vec<(String, String)>>;
 
 fn described() -> Described {
@@ -211,7 +211,7 @@ fn described() -> Described {
     all
 }
 
-/// How a traced kind differs from the type of this name; empty: not at all.
+/// Differences between a traced kind and the type of this name; empty: there are none.
 fn differences(types: &Described, path: &str, wanted: &str, kind: &Kind) -> Vec<String> {
     let differs = || vec![format!("{path}: {wanted} in ROS 2, {kind:?} in Rust")];
     if let Some(element) = wanted.strip_suffix(']') {
@@ -221,7 +221,7 @@ fn differences(types: &Described, path: &str, wanted: &str, kind: &Kind) -> Vec<
             (Kind::Array(len, inside), count) if count == len.to_string() => {
                 differences(types, &path, element, inside)
             }
-            // A bound is a matter of the sender; on the wire it is a sequence.
+            // The sender checks a bound; on the wire it is a sequence.
             (Kind::Sequence(inside), count) if count.is_empty() || count.starts_with("<=") => {
                 differences(types, &path, element, inside)
             }
@@ -229,11 +229,11 @@ fn differences(types: &Described, path: &str, wanted: &str, kind: &Kind) -> Vec<
         };
     }
     let Kind::Fields(fields) = kind else {
-        // A struct of one field is that field on the wire.
+        // On the wire a struct with one field is that field.
         if let Some([(_, only)]) = types.get(wanted).map(Vec::as_slice) {
             return differences(types, path, only, kind);
         }
-        // A byte is eight bits, whatever it is called.
+        // A byte has eight bits under either name.
         let wanted_word = if wanted == "byte" { "uint8" } else { wanted };
         let same = matches!(kind, Kind::Word(word) if *word == wanted_word);
         return if same { Vec::new() } else { differs() };

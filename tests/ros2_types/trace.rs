@@ -1,21 +1,21 @@
-//! What a struct is to CDR: the calls that its `Deserialize` makes, field by field.
+//! A struct as CDR reads it: the calls of its `Deserialize`, field by field.
 //!
-//! In: a type. Out: a tree of words as `.msg` files write them (`uint8`, `string`, `T[8]`, `T[]`), structs by their
+//! In: a type. Out: a tree of type names as in `.msg` files (`uint8`, `string`, `T[8]`, `T[]`), structs with their
 //! fields.
 
 use std::fmt;
 
 use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, SeqAccess, Visitor};
 
-/// What stands in one place of a message.
+/// The type of one element of a message.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) enum Kind {
-    /// Nothing read yet.
+    /// Not read yet.
     #[default]
     Unknown,
     /// A single value.
     Word(&'static str),
-    /// A sequence, with what it holds.
+    /// A sequence, with its element type.
     Sequence(Box<Kind>),
     /// An array of a fixed length.
     Array(usize, Box<Kind>),
@@ -32,13 +32,13 @@ pub(crate) fn trace<T: DeserializeOwned>() -> Kind {
 
 struct Tracer<'a>(&'a mut Kind);
 
-/// Hands out `left` elements, all of one kind.
+/// Supplies `left` elements, all of one kind.
 struct Elements<'a> {
     kind: &'a mut Kind,
     left: usize,
 }
 
-/// Hands out the fields of a struct.
+/// Supplies the fields of a struct.
 struct Fields<'a> {
     names: std::slice::Iter<'static, &'static str>,
     into: &'a mut Vec<(&'static str, Kind)>,

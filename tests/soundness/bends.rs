@@ -1,4 +1,4 @@
-//! How meshes deform from tick to tick, and the messages that say so.
+//! The deformation of meshes from tick to tick, and the messages for it.
 
 use sweepd::math::{Point, Vec3};
 use sweepd::wire::{Inbox, VertexHeader, WIRE_VERSION, name_bytes, vertex_flags};
@@ -6,21 +6,21 @@ use sweepd::wire::{Inbox, VertexHeader, WIRE_VERSION, name_bytes, vertex_flags};
 use crate::oracle::meshes::Soup;
 use crate::oracle::rng::Rng;
 
-/// A mesh on its way through shapes.
+/// The deformation of one mesh.
 #[derive(Default)]
 pub struct Bend {
     /// The vertices at the start.
     rest: Vec<Point>,
-    /// Of the last message, and of the one before.
+    /// Version after the last message, and before it.
     versions: [u64; 2],
-    /// What changed since: places of vertices; `None`: nothing.
+    /// Indices of the vertices that changed since; `None`: nothing changed.
     changed: Option<std::ops::Range<usize>>,
-    /// What the next step takes back.
+    /// Translation that the next step reverses.
     there: Option<Vec3>,
 }
 
 impl Bend {
-    /// One tick of deformation, of a mesh about `s` metres large.
+    /// One tick of deformation, of a mesh of size about `s` metres.
     pub fn step(&mut self, rng: &mut Rng, soup: &mut Soup, s: f64) {
         let len = soup.vertices.len();
         if self.rest.is_empty() {
@@ -65,7 +65,7 @@ impl Bend {
                 }
             }
             5 => {
-                // There now, and back in the next tick.
+                // A translation that the next tick reverses.
                 let by = rng.direction() * 0.01 * s;
                 soup.vertices.iter_mut().for_each(|v| *v += by);
                 self.there = Some(by);
@@ -84,7 +84,7 @@ impl Bend {
                 }
             }
             _ => {
-                // Towards the rest by a tenth: a slow return.
+                // Returns to the rest shape, by a tenth per tick.
                 for (v, rest) in soup.vertices.iter_mut().zip(&self.rest) {
                     *v += (rest - *v) * 0.1;
                 }
@@ -96,14 +96,14 @@ impl Bend {
     }
 }
 
-/// To what the wire carries.
+/// Rounds to the precision of the wire.
 fn round(soup: &mut Soup, range: std::ops::Range<usize>) {
     for v in &mut soup.vertices[range] {
         *v = v.map(|x| f64::from(x as f32));
     }
 }
 
-/// Appends what a client sends of a mesh: all of it first, then what changed.
+/// Appends the message that a client sends: first all vertices, later those that changed.
 pub fn send(inbox: &mut Inbox, body: u64, seq: u64, bend: &Bend, soup: &Soup) {
     let total = soup.vertices.len();
     let range = if seq == 1 {

@@ -1,4 +1,4 @@
-//! Couples of bodies of all kinds, and how they move.
+//! Couples of bodies of all kinds, and their motion.
 
 use sweepd::config::Config;
 use sweepd::ids::BodyId;
@@ -15,10 +15,10 @@ use crate::oracle::rng::Rng;
 use crate::regimes::{Regime, Shares};
 use crate::truth::{At, Bounds, bounds};
 
-/// Directions that a search of the oracle begins with.
+/// Initial directions of the oracle's search.
 const SAMPLES: u32 = 240;
-/// So often a couple is moved to where it is to be before it stays where it is: out of one another, to the gap asked
-/// for, and once more for what is thin and was passed through.
+/// Most moves of a couple per tick towards its regime: out of each other, to the wanted gap, and once more for thin
+/// shapes that were passed through.
 const MOVES_MAX: usize = 3;
 
 pub struct Part {
@@ -28,25 +28,25 @@ pub struct Part {
 
 pub struct Body {
     pub parts: Vec<Part>,
-    /// About where it is, metres.
+    /// Approximate size, metres.
     pub size: f64,
     pub pose: Pose,
-    /// How its one mesh deforms.
+    /// The deformation of its only mesh.
     pub bend: Option<Bend>,
 }
 
 pub struct Couple {
     pub kinds: (usize, usize),
-    /// By id: 2k + 1 and 2k + 2.
+    /// Their ids are 2k + 1 and 2k + 2.
     pub bodies: [Body; 2],
-    /// The truth of each pair of their parts, those of the first body's first part first.
+    /// The truth for each pair of their parts, in order of the first body's parts.
     pub gaps: Vec<Bounds>,
     home: Vec3,
     mode: usize,
     regime: Regime,
 }
 
-/// The truth of two bodies.
+/// The truth for two bodies.
 pub fn gap_of(a: &Body, b: &Body, samples: u32) -> Bounds {
     least(&gaps_of(a, b, samples))
 }
@@ -56,7 +56,7 @@ fn least(gaps: &[Bounds]) -> Bounds {
         .fold(Bounds::FAR, |least, gap| least.least(*gap))
 }
 
-/// Whether two bodies overlap by no less than `depth`, metres: whether two of their parts do.
+/// Whether two bodies overlap by at least `depth`, metres: whether two of their parts do.
 pub fn depth_of(a: &Body, b: &Body, depth: f64) -> Search {
     let mut all = Search::Refuted;
     for (one, other) in placed(a, b) {
@@ -69,16 +69,16 @@ pub fn depth_of(a: &Body, b: &Body, depth: f64) -> Search {
     all
 }
 
-/// The truth of each pair of their parts.
+/// The truth for each pair of their parts.
 fn gaps_of(a: &Body, b: &Body, samples: u32) -> Vec<Bounds> {
     let parts = placed(a, b).into_iter();
     parts.map(|(a, b)| bounds(a, b, samples)).collect()
 }
 
-/// Each pair of their parts, at places in one frame.
+/// Each pair of their parts, with poses in one frame.
 fn placed<'a>(a: &'a Body, b: &'a Body) -> Vec<(At<'a>, At<'a>)> {
     let mut pairs = Vec::new();
-    // Seen from A's place: far from the origin sums of poses lose what their difference keeps.
+    // Relative to A's position: far from the origin sums of poses lose digits that their difference keeps.
     let shift = b.pose.translation.vector - a.pose.translation.vector;
     let pose_a = Pose::from_parts(Vec3::zeros().into(), a.pose.rotation);
     let pose_b = Pose::from_parts(shift.into(), b.pose.rotation);
@@ -91,7 +91,7 @@ fn placed<'a>(a: &'a Body, b: &'a Body) -> Vec<(At<'a>, At<'a>)> {
     pairs
 }
 
-/// A body of a kind; one in four has a second shape. With it what a scene says.
+/// A body of a kind, with a second shape in one of four cases; and its scene text.
 fn any_body(rng: &mut Rng, kind: usize, s: f64, id: u64, group: u32) -> (Body, BodySpec) {
     let mut parts = Vec::new();
     let mut shapes = Vec::new();
@@ -128,23 +128,23 @@ fn any_body(rng: &mut Rng, kind: usize, s: f64, id: u64, group: u32) -> (Body, B
 }
 
 impl Couple {
-    /// The truth of the two.
+    /// The truth for the two.
     pub fn gap(&self) -> Bounds {
         least(&self.gaps)
     }
 
-    /// The size of the larger one, metres.
+    /// The size of the larger body, metres.
     pub fn large(&self) -> f64 {
         self.bodies[0].size.max(self.bodies[1].size)
     }
 
-    /// The size of the smaller one, metres.
+    /// The size of the smaller body, metres.
     pub fn small(&self) -> f64 {
         self.bodies[0].size.min(self.bodies[1].size)
     }
 
-    /// How far the truth may be off, metres: by rounding, and the search of directions creeps along the ridges that
-    /// circles make.
+    /// Greatest error of the truth, metres: from rounding, and because the search for directions progresses slowly
+    /// along the ridges of circular shapes.
     pub fn missed(&self) -> f64 {
         let mut parts = self.bodies.iter().flat_map(|body| &body.parts);
         let curved = |solid: &Solid| matches!(solid, Solid::Cylinder(..) | Solid::Cone(..));
@@ -155,25 +155,25 @@ impl Couple {
         }
     }
 
-    /// What rounding may be, metres.
+    /// Greatest rounding error, metres.
     pub fn noise(&self) -> f64 {
         1e-11 * self.large()
     }
 
-    /// What they are, and how large.
+    /// Kinds and sizes of the two, as text.
     pub fn names(&self) -> String {
         let ((one, other), [a, b]) = (self.kinds, &self.bodies);
         let (one, other) = (NAMES[one], NAMES[other]);
         format!("{one} - {other} sizes {} {}", a.size, b.size)
     }
 
-    /// The first place.
+    /// Sets the initial poses.
     pub fn begin(&mut self, rng: &mut Rng) {
         self.place(rng);
         self.settle(rng, true);
     }
 
-    /// Places both anew: one deep in the other, or about where they begin to touch.
+    /// Places both again: one deep in the other, or near first contact.
     fn place(&mut self, rng: &mut Rng) {
         let home = self.home;
         let [a, b] = &mut self.bodies;
@@ -192,7 +192,7 @@ impl Couple {
                 reach = a.size.max(b.size) * 2.0;
             }
         }
-        // Of those that are to be close some are so in a hole or a cavity.
+        // Some couples that are to be close are so in a hole or a cavity.
         let deep = match self.regime {
             Regime::Overlapping => true,
             Regime::Close => rng.below(4) == 0,
@@ -207,12 +207,12 @@ impl Couple {
         b.pose = Pose::from_parts(at.into(), rotation);
     }
 
-    /// Moves the second body to where the two are to be, and takes note of the truth there.
+    /// Moves the second body into the couple's regime, and stores the truth there.
     ///
-    /// One move does for two that are apart, whatever they are: what comes nearer by less than its distance does not
-    /// touch, and the nearest points stay the nearest.
+    /// One move suffices for two bodies that are apart: an approach by less than their distance causes no contact, and
+    /// the nearest points stay the nearest.
     ///
-    /// * `moved` - whether either moved or deformed since the last time.
+    /// * `moved` - whether either body has moved or deformed since the last call.
     fn settle(&mut self, rng: &mut Rng, moved: bool) {
         let small = self.small();
         let [a, b] = &mut self.bodies;
@@ -227,7 +227,7 @@ impl Couple {
             let (from, at) = (a.pose.translation.vector, b.pose.translation.vector);
             let to = match gap.way {
                 Some(way) => at + way * (self.regime.gap(rng, small) - gap.high),
-                // Out of one another, whatever they are.
+                // Separates the two, whatever their shapes.
                 None => {
                     let out = (at - from).try_normalize(1e-9);
                     from + out.unwrap_or_else(|| rng.direction()) * (a.size + b.size)
@@ -238,9 +238,9 @@ impl Couple {
         }
     }
 
-    /// One tick of motion; then the second body is where the two are to be.
+    /// One tick of motion; then moves the second body into the couple's regime.
     ///
-    /// * `shares` - of the scene so far.
+    /// * `shares` - shares of the regimes in the scene so far.
     pub fn step(&mut self, rng: &mut Rng, shares: &Shares) {
         if rng.below(6) == 0 {
             self.mode = rng.below(7);
@@ -297,7 +297,7 @@ impl Couple {
     }
 }
 
-/// A couple for each pair of kinds, and the scene of them all.
+/// A couple for each pair of kinds, and the scene of all couples.
 pub fn any_scene(rng: &mut Rng, kinds: &[(usize, usize)]) -> (Vec<Couple>, Scene) {
     let origin = if rng.below(4) == 0 {
         rng.vector(1e7)
@@ -343,7 +343,7 @@ pub fn any_scene(rng: &mut Rng, kinds: &[(usize, usize)]) -> (Vec<Couple>, Scene
     (couples, scene)
 }
 
-/// Takes over the meshes that were built: a height field's is made there, and shells may be turned round.
+/// Replaces meshes by the built ones: that of a height field is made in the build, and shells may have been inverted.
 pub fn take_meshes(couples: &mut [Couple], built: &[Parts]) {
     for (at, shapes) in built.iter().enumerate() {
         for (part, placed) in couples[at / 2].bodies[at % 2]

@@ -1,10 +1,10 @@
-//! Whether two shapes can overlap as deeply as is said: a search for a point that deep, which either finds one or proves
-//! that there is none.
+//! Whether two shapes can overlap as deeply as claimed: a search for a point of that depth, which either finds one or
+//! proves that there is none.
 //!
-//! The depth of a solid is that of a point of the one under the surface of the other. How deep a point lies changes by
-//! no more than the point moves, so what is known at the middle of a cell bounds all of it: cells in which no point of
-//! both can be deep enough are dropped, and the most promising of the others is halved. Cells are boxes, or of a surface
-//! parts of its triangles. Where cells are left when the search gives up, nothing is said.
+//! The depth of an overlap with a solid is that of a point of one below the surface of the other. The depth of a point
+//! changes by at most the motion of the point, so the depth at the middle of a cell bounds that of the whole cell.
+//! Cells without a point deep enough in both are dropped, and the most promising one of the others is halved. Cells are
+//! boxes, or for a surface parts of its triangles. If cells are left when the search gives up, the result is open.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -15,26 +15,26 @@ use crate::kinds::Solid;
 use crate::oracle::{Placed, Triangle, point_triangle};
 use crate::truth::{At, bounds};
 
-/// Cells looked into before the search gives up.
+/// Most cells examined before the search gives up.
 const CELLS_MAX: usize = 2_000;
-/// What is said is found where this part of it is: the last part of the way would take most of the time.
+/// A depth counts as found at this share of it: the last part of the search would take most of the time.
 const ENOUGH: f64 = 0.99;
-/// Directions that are looked into for what parts two convex shapes.
+/// Directions searched for the separation of two convex shapes.
 const SAMPLES: u32 = 240;
 
-/// What a search came to.
+/// The result of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Search {
-    /// There is a point that deep.
+    /// There is a point of that depth.
     Found,
-    /// There is none.
+    /// There is no such point.
     Refuted,
-    /// Neither was shown.
+    /// Neither was proved.
     Open,
 }
 
-/// Whether two shapes overlap by no less than `depth`, metres: of a solid mesh by the depth of a point; of a surface by
-/// what parts one of its triangles from the other shape; of all others by what parts the two.
+/// Whether two shapes overlap by at least `depth`, metres: for a solid mesh by the depth of a point; for a surface by
+/// the separation of one of its triangles from the other shape; for all others by the separation of the two.
 pub fn search(a: At<'_>, b: At<'_>, depth: f64) -> Search {
     let solid = |at: &At<'_>| matches!(at.0, Solid::Mesh(_, true));
     if solid(&a) || solid(&b) {
@@ -56,7 +56,7 @@ pub fn search(a: At<'_>, b: At<'_>, depth: f64) -> Search {
     all
 }
 
-/// The triangles of a surface, or what else a shape is.
+/// The triangles of a surface, or any other shape itself.
 fn pieces((solid, _): At<'_>) -> Vec<Solid> {
     match solid {
         Solid::Mesh(soup, _) => {
@@ -68,9 +68,9 @@ fn pieces((solid, _): At<'_>) -> Vec<Solid> {
     }
 }
 
-/// Looks for a point of both shapes that lies no less than `depth` under the surface of one of them, metres.
+/// Searches for a point of both shapes that is at least `depth` below the surface of one of them, metres.
 ///
-/// Round shapes that are no sphere and no capsule stand for polytopes around them, in which points are deeper.
+/// Round shapes other than sphere and capsule are replaced by circumscribed polytopes, in which points are deeper.
 fn point_search(a: At<'_>, b: At<'_>, depth: f64) -> Search {
     let from = a.1.translation.vector;
     let bodies = [Body::of(a, &from), Body::of(b, &from)];
@@ -104,7 +104,7 @@ fn point_search(a: At<'_>, b: At<'_>, depth: f64) -> Search {
     Search::Open
 }
 
-/// What two bodies have in common lies in these.
+/// Cells that cover the intersection of two bodies.
 fn first_cells(bodies: &[Body; 2]) -> Vec<Cell> {
     for body in bodies {
         if let Body::Mesh(mesh) = body
@@ -122,17 +122,17 @@ fn first_cells(bodies: &[Body; 2]) -> Vec<Cell> {
     )]
 }
 
-/// Where the search looks.
+/// A part of the search space.
 #[derive(Clone, Copy)]
 enum Cell {
     /// Middle and half extents.
     Box(Point, Vec3),
-    /// Part of a triangle of the one that is a surface.
+    /// Part of a triangle of the shape that is a surface.
     Triangle(Triangle),
 }
 
 impl Cell {
-    /// A point of it, and how far from there it reaches.
+    /// A point of the cell, and the radius around it that contains the cell.
     fn about(&self) -> (Point, f64) {
         let (middle, reach) = match self {
             Self::Box(middle, half) => (*middle, half.norm()),
@@ -145,7 +145,7 @@ impl Cell {
         (middle, reach * (1.0 + 1e-12))
     }
 
-    /// Cut through the middle of its longest side.
+    /// Halves at the middle of the longest side.
     fn halves(&self) -> Vec<Self> {
         match *self {
             Self::Box(middle, mut half) => {
@@ -172,7 +172,7 @@ impl Cell {
     }
 }
 
-/// A cell that may hold a point as deep as this, metres.
+/// A cell that may contain a point of this depth, metres.
 struct Open(f64, Cell);
 
 impl Ord for Open {
@@ -195,11 +195,11 @@ impl PartialEq for Open {
 
 impl Eq for Open {}
 
-/// A shape that tells how deep a point lies in it.
+/// A shape for which the depth of a point can be computed.
 enum Body {
-    /// About its middle line: from the first point to the second, and a radius.
+    /// Around an axis segment between two points, with a radius.
     Round(Point, Point, f64),
-    /// Above this plane it is empty: unit normal, offset.
+    /// The half-space below this plane: unit normal, offset.
     Below(Vec3, f64),
     Mesh(Placed),
 }
@@ -236,8 +236,8 @@ impl Body {
         }
     }
 
-    /// How deep a point lies under the surface, metres; of one outside minus how far off. Parts of a surface are where
-    /// it is.
+    /// Depth of a point below the surface, metres; negative distance for a point outside. For a cell of a surface it is
+    /// 0.
     fn depth(&self, p: &Point, cell: &Cell) -> f64 {
         match self {
             Self::Mesh(mesh) if !mesh.solid && matches!(cell, Cell::Triangle(_)) => 0.0,
@@ -248,7 +248,7 @@ impl Body {
         }
     }
 
-    /// A box around it; `None`: it has no end.
+    /// Its bounding box; `None`: it is unbounded.
     fn bounds(&self) -> Option<(Vec3, Vec3)> {
         match self {
             Self::Round(a, b, r) => {
@@ -268,7 +268,7 @@ impl Body {
     }
 }
 
-/// The box that two bodies have in common, a little larger.
+/// The intersection of the two bounding boxes, slightly enlarged.
 fn common([a, b]: &[Body; 2]) -> Option<(Vec3, Vec3)> {
     let everything = || {
         let far = Vec3::from_element(f64::MAX);

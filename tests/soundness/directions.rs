@@ -1,4 +1,4 @@
-//! The gap of convex shapes: the greatest that any direction proves.
+//! The gap of convex shapes: the greatest separation over all directions.
 
 use sweepd::math::{Point, Vec3};
 
@@ -6,19 +6,19 @@ use crate::kinds::Solid;
 use crate::oracle::{Triangle, crosses, triangle_distance};
 use crate::truth::At;
 
-/// Bounds on the gap of two shapes that are no meshes, and the direction that proves the lower one, from the first to
+/// Bounds on the gap of two shapes that are not meshes, and the direction that proves the lower one, from the first to
 /// the second.
 ///
-/// * `samples` - directions that a search begins with, where not all that can be the best are tried.
+/// * `samples` - initial directions of a search, if not all candidate directions can be tried.
 pub fn of_convex(a: At<'_>, b: At<'_>, samples: u32) -> ([f64; 2], Vec3) {
     let (Some(one), Some(other)) = (Core::of(a), Core::of(b)) else {
         let (gap, n) = greatest(a, b, samples);
         return ([gap; 2], n);
     };
     let (low, n) = exact(a, b, &one, &other);
-    // A direction that is off by the rounding of its corners proves less, by that times the larger one's size: the
-    // smaller the distance of the cores beside it, the more. Where neither core reaches into the other the distance of
-    // their surfaces is the gap, too.
+    // The rounding error of a direction, times the size of the larger shape, reduces the separation that it proves; the
+    // error grows as the distance of the cores shrinks. If neither core penetrates the other, the distance of their
+    // surfaces is also the gap.
     let core_m = low + one.radius + other.radius;
     let (small, large) = (one.size.min(other.size), one.size.max(other.size));
     let blurred = large > LARGE * small || core_m.abs() < 1e-4 * large;
@@ -30,25 +30,25 @@ pub fn of_convex(a: At<'_>, b: At<'_>, samples: u32) -> ([f64; 2], Vec3) {
     ([low, high], n)
 }
 
-/// Of two sizes so far apart the distance of the surfaces is asked too.
+/// From this ratio of sizes on the distance of the surfaces is computed too.
 const LARGE: f64 = 100.0;
 
-/// The gap that direction `n` proves: how far the planes across it keep the two apart.
+/// The gap proved by direction `n`: the separation of the two along it.
 fn f(a: At<'_>, b: At<'_>, n: &Vec3) -> f64 {
     let in_a = a.1.rotation.inverse_transform_vector(n);
     let in_b = b.1.rotation.inverse_transform_vector(&-n);
     n.dot(&(b.1.translation.vector - a.1.translation.vector)) - a.0.reach(&in_a) - b.0.reach(&in_b)
 }
 
-/// Corners, edges and face normals of a shape that is a polytope with a radius, as directions in the common frame.
+/// Vertices, edges and face normals of a polytope with a radius, in the axes of the common frame.
 struct Core {
     corners: Vec<Vec3>,
     edges: Vec<(Vec3, Vec3)>,
     normals: Vec<Vec3>,
-    /// Its surface, or the points and lines that stand for it.
+    /// Its surface, or degenerate triangles for a point or a segment.
     triangles: Vec<Triangle>,
     radius: f64,
-    /// Greatest distance of a corner from the first, and the radius.
+    /// Greatest distance of a vertex from the first one, plus the radius.
     size: f64,
 }
 
@@ -99,7 +99,7 @@ impl Core {
         }
     }
 
-    /// The distance of two that are apart: rounding is that of their corners.
+    /// The distance of two cores, exact up to the rounding of their vertices; 0 if they cross.
     fn distance(&self, other: &Self) -> f64 {
         let pairs =
             (self.triangles.iter()).flat_map(|s| other.triangles.iter().map(move |t| (s, t)));
@@ -114,14 +114,14 @@ impl Core {
     }
 }
 
-/// Greatest distance of a corner from the first.
+/// Greatest distance of a vertex from the first one.
 fn spread(corners: &[Vec3]) -> f64 {
     let from = |corner: &Vec3| (corner - corners[0]).norm();
     corners.iter().map(from).fold(0.0, f64::max)
 }
 
-/// The gap of two polytopes with radii: the greatest `f` is at a face normal, across two edges, or along the line
-/// between two corners or from a corner to an edge; all are tried. With the direction.
+/// The gap of two polytopes with radii, and its direction: the greatest `f` is at a face normal, across two edges, or
+/// along the line between two vertices or from a vertex to an edge; all of these are tried.
 fn exact(a: At<'_>, b: At<'_>, one: &Core, other: &Core) -> (f64, Vec3) {
     let mut top = (f64::NEG_INFINITY, Vec3::z());
     let mut offer = |n: Vec3| {
@@ -153,7 +153,7 @@ fn exact(a: At<'_>, b: At<'_>, one: &Core, other: &Core) -> (f64, Vec3) {
     for (p, q) in &one.edges {
         for (r, s) in &other.edges {
             offer((q - p).cross(&(s - r)));
-            // Parallel edges of flat shapes: across them, within their plane.
+            // For parallel edges of flat shapes: perpendicular to the edges, within their plane.
             offer((q - p).cross(&(q - p).cross(&(r - p))));
         }
     }
@@ -167,15 +167,14 @@ fn exact(a: At<'_>, b: At<'_>, one: &Core, other: &Core) -> (f64, Vec3) {
             edges.iter().for_each(|(p, q)| offer(n.cross(&(q - p))));
         }
     }
-    // Lines that meet: any direction across both.
+    // For intersecting lines: any direction perpendicular to both.
     [Vec3::x(), Vec3::y(), Vec3::z()]
         .into_iter()
         .for_each(offer);
     top
 }
 
-/// The greatest `f` that sampling and climbing finds: the gap of convex shapes is the greatest of all. With the
-/// direction.
+/// The greatest `f` found by sampling and hill climbing, and its direction: the gap of convex shapes is the maximum.
 fn greatest(a: At<'_>, b: At<'_>, samples: u32) -> (f64, Vec3) {
     let mut tops: Vec<(f64, Vec3)> = (0..samples)
         .map(|k| {
@@ -212,7 +211,7 @@ fn climb(a: At<'_>, b: At<'_>, mut top: (f64, Vec3), fine: u32) -> (f64, Vec3) {
         let v = top.1.cross(&u);
         let mut moved = false;
         turn += 0.37;
-        // Along a ridge only a narrow wedge of directions leads up: where eight find none, many look for it.
+        // Along a ridge only a narrow wedge of directions leads up: if eight directions find none, many are tried.
         for count in [8, fine] {
             let start = top.1;
             for k in 0..count {

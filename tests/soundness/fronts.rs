@@ -1,9 +1,9 @@
-//! Certificate fronts of the couples' meshes beside the engines, one for each pair of their parts, tick after tick at
-//! the same places, deforming with an engine's bodies, and stopped at random: what they cover, leaf by leaf, and what
-//! they say, against the same truth.
+//! Certificate fronts of the couples' meshes in addition to the engines, one for each pair of their parts, at the same
+//! poses in each tick, deforming with an engine's bodies, and interrupted at random: their cover, leaf pair by leaf
+//! pair, and their results are compared with the same truth.
 //!
-//! The engines' own fronts stay behind while a glance tells enough; these go along in each tick. Between convex shapes,
-//! and over a half-space, there are no pairs of leaves and no fronts.
+//! The engines' own fronts are not moved while a cheap test suffices; these are moved in each tick. Pairs of convex
+//! shapes and pairs with a half-space have no leaf pairs and no fronts.
 
 use std::collections::BTreeMap;
 
@@ -19,14 +19,14 @@ use crate::oracle::rng::Rng;
 use crate::tally::{Fault, Tally};
 use crate::truth::Bounds;
 
-/// What was checked.
+/// Counts of what was checked.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Checked {
-    /// Pair-ticks with a front at least, each looked at whenever its work was stopped.
+    /// Pair-ticks with at least one front, each checked at every interruption.
     pub pair_ticks: u64,
-    /// Times that what a front covers was counted.
+    /// Number of checks of a front's cover.
     pub covers: u64,
-    /// Pairs of leaves that were to be found in them, each just once.
+    /// Number of leaf pairs that had to be covered exactly once.
     pub leaf_pairs: u64,
 }
 
@@ -39,14 +39,14 @@ pub struct Fronts {
     fronts: BTreeMap<(usize, usize), CarriedFront>,
 }
 
-/// A pair of shapes at a place, and what is true of it.
+/// A pair of shapes at a pose, and its truth.
 struct Pair<'a> {
     a: &'a Shape,
     b: &'a Shape,
     truth: Bounds,
     /// The size of the larger body, metres.
     size: f64,
-    /// How far the truth may be off, metres.
+    /// Greatest error of the truth, metres.
     missed: f64,
     what: String,
 }
@@ -61,9 +61,9 @@ impl Fronts {
         }
     }
 
-    /// One tick of the fronts of the couple in a place of the scene.
+    /// One tick of the fronts of the couple at this index of the scene.
     ///
-    /// * `world` - as the couple is now; of the same engine in each tick.
+    /// * `world` - the couple's current state, from the same engine in each tick.
     pub fn tick(
         &mut self,
         place: usize,
@@ -116,7 +116,7 @@ impl Fronts {
     }
 }
 
-/// Whether a front that was stopped holds the truth, and covers every pair of leaves just once.
+/// Checks that an interrupted front contains the truth, and covers every leaf pair exactly once.
 fn look(
     front: &CarriedFront,
     store: &FrontStore,
@@ -140,7 +140,7 @@ fn look(
     });
 }
 
-/// Whether a front that has reached its goal has the right verdict, and the gap where it was asked for.
+/// Checks that a front that reached its goal has the right verdict, and the gap if that was the goal.
 fn look_at_end(front: &CarriedFront, pair: &Pair<'_>, goal: Goal, tally: &mut Tally) {
     let (end, truth) = (front.interval(), pair.truth);
     let least = pair.missed.max(1e-9 * pair.size);
@@ -155,7 +155,7 @@ fn look_at_end(front: &CarriedFront, pair: &Pair<'_>, goal: Goal, tally: &mut Ta
     });
 }
 
-/// How many leaves a shape has: its triangles; a convex shape is one.
+/// The number of leaves of a shape: its triangles; 1 for a convex shape.
 fn leaves(shape: &Shape) -> u32 {
     match &shape.geometry {
         Geometry::Mesh(mesh) => u32::try_from(mesh.faces().len()).unwrap(),
@@ -163,7 +163,7 @@ fn leaves(shape: &Shape) -> u32 {
     }
 }
 
-/// How many pairs of leaves are missing in a sorted list, or are in it more than once, or are none.
+/// The number of leaf pairs missing from a sorted list, repeated in it, or invalid.
 fn off(covered: &[(u32, u32)], of_a: u32, of_b: u32) -> u64 {
     let all = (0..of_a).flat_map(|i| (0..of_b).map(move |j| (i, j)));
     if all.clone().eq(covered.iter().copied()) {

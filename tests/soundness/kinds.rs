@@ -1,4 +1,4 @@
-//! Shapes of all kinds, as a scene says them and as the oracle sees them.
+//! Shapes of all kinds, as scene text and as the oracle represents them.
 
 use sweepd::math::{Point, Vec3};
 use sweepd::shape::ShapeSpec;
@@ -8,7 +8,7 @@ use crate::oracle::rng::Rng;
 
 pub const KINDS: usize = 13;
 pub const HALF_SPACE: usize = 9;
-/// From here on bodies deform.
+/// Kinds from this one on are deforming bodies.
 pub const BENDING: usize = 11;
 pub const NAMES: [&str; KINDS] = [
     "sphere",
@@ -40,8 +40,8 @@ pub enum Solid {
     HalfSpace(Vec3, f64),
 }
 
-/// A random shape of a kind, about `s` metres large, and what a scene says of it. The mesh of a height field is for the
-/// caller to take from what was built.
+/// A random shape of a kind, of size about `s` metres, and its scene text. The caller takes the mesh of a height field
+/// from the built shape.
 pub fn any(rng: &mut Rng, kind: usize, s: f64) -> (Solid, ShapeSpec) {
     let mut size = || s * rng.range(0.3, 1.0);
     let (radius, half_height, third) = (size(), size(), size());
@@ -177,7 +177,7 @@ impl Solid {
         }
     }
 
-    /// Polytopes inside and around the shape that are meshes, and whether they are filled. Equal where it is one.
+    /// Polytopes inside and around the shape, as meshes. They are equal if the shape is a polytope or a triangle.
     pub fn between(&self) -> [Soup; 2] {
         match self {
             Self::Cuboid(h) => [meshes::cuboid(*h), meshes::cuboid(*h)],
@@ -198,10 +198,10 @@ impl Solid {
     }
 }
 
-/// Sides of the polygon that stands for a circle.
+/// Sides of the polygon that approximates a circle.
 const SIDES: u32 = 12;
 
-/// A prism or pyramid in (`outside` 0) or round (1) a cylinder or cone.
+/// A prism or pyramid inscribed in (`outside` 0) or circumscribed about (1) a cylinder or cone.
 fn prism(low: f64, high: f64, h: f64, outside: f64) -> Soup {
     let grow = 1.0 + outside * (1.0 / (std::f64::consts::PI / f64::from(SIDES)).cos() - 1.0);
     let mut vertices = vec![Point::new(0.0, 0.0, -h), Point::new(0.0, 0.0, h)];

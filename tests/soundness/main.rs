@@ -1,15 +1,15 @@
-//! Goal: whatever is published holds the truth, at any budget, for every kind of shape (laws 1, 3.4). Method: couples
-//! of bodies of all kinds in random motion, driven through four engines at once (work without limit, with a random stop
-//! in each tick, with half of what the first one spent, to a deadline and on after its outbox was taken); each
-//! published verdict and interval against an oracle that shares no code with the narrow phase (`truth.rs`; how deep an
-//! overlap can be at most, where that is said: `depth.rs`). Beside the engines go certificate fronts of the meshes,
-//! stopped at random, of which every pair of leaves is looked up (`fronts.rs`).
+//! Goal: everything published is sound, at any budget, for every kind of shape (laws 1, 3.4). Method: couples of bodies
+//! of all kinds in random motion, in four engines at once (unlimited work; a random limit in each tick; half of the
+//! first one's work; a deadline with continued work after publishing). Each published verdict and interval is compared
+//! with an oracle that shares no code with the narrow phase (`truth.rs`; claims on the depth of an overlap:
+//! `depth.rs`). In addition certificate fronts of the meshes are interrupted at random, and every leaf pair of them is
+//! checked (`fronts.rs`).
 //!
-//! At least a third of the pair-ticks overlap, and at least a third are apart by no more than 1 % of the smaller body's
-//! size, as the oracle proves (`regimes.rs`). Faults are counted to the end; then there must be none.
+//! At least a third of the pair-ticks overlap, and at least a third are apart by at most 1 % of the smaller body's
+//! size, as proved by the oracle (`regimes.rs`). Faults are counted to the end; the count must be 0.
 //!
-//! `SWEEPD_PAIR_TICKS` says how many couples times ticks; default 1,500; `SWEEPD_SEED` where to start. The ignored ones
-//! are the same with 100,000 of them.
+//! `SWEEPD_PAIR_TICKS` sets the number of couples times ticks, 1,500 by default; `SWEEPD_SEED` sets the first seed. The
+//! ignored tests are the same with 100,000 pair-ticks.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -65,7 +65,7 @@ fn law_4_6_bodies_that_deform_hold_it_too_with_all_kinds_of_shapes_and_at_any_bu
 #[test]
 #[ignore = "takes minutes; SWEEPD_CI_SLOW=1 .ci/run runs it"]
 fn law_4_6_the_same_in_100_000_pair_ticks_with_fronts() {
-    // All have fronts but those with a half-space, 2 of the 25 pairs of kinds.
+    // All have fronts except for those with a half-space, 2 of the 25 pairs of kinds.
     let run = bending(LARGE * 25 / 23 + 1);
     assert_large(&run);
     let fronts = run.fronts.pair_ticks;
@@ -74,7 +74,7 @@ fn law_4_6_the_same_in_100_000_pair_ticks_with_fronts() {
 
 const LARGE: u64 = 100_000;
 
-/// As many as are asked for, and enough of each pair of kinds.
+/// Asserts that there were enough pair-ticks, and enough of each pair of kinds.
 fn assert_large(run: &Run) {
     let all = run.shares.all;
     assert!(all >= LARGE, "{all} pair-ticks");
@@ -91,7 +91,8 @@ fn bending(wanted: u64) -> Run {
     run
 }
 
-/// Runs scenes of all pairs of kinds of which the second is `wanted_kind`; asserts what holds of any number of them.
+/// Runs scenes of all pairs of kinds whose second kind fulfils `wanted_kind`; asserts what must hold for any number of
+/// pair-ticks.
 fn run_all(wanted: u64, wanted_kind: impl Fn(usize) -> bool) -> Run {
     let number = |name: &str| std::env::var(name).map(|text| text.parse::<u64>().unwrap());
     let wanted = number("SWEEPD_PAIR_TICKS").unwrap_or(wanted);

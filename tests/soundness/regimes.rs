@@ -1,18 +1,18 @@
-//! Where couples are to be: a third overlapping, a third apart by no more than a hundredth, the others wherever their
-//! motion leads.
+//! Wanted poses of couples: a third overlapping, a third apart by at most a hundredth, the others wherever their motion
+//! leads.
 
 use crate::oracle::rng::Rng;
 use crate::truth::Bounds;
 
-/// A pair that is apart by no more than this part of the smaller body's size is close. A body's size is twice the scale
-/// that it is drawn at: about its diameter.
+/// A pair that is apart by at most this share of the smaller body's size is close. The size of a body is twice the
+/// scale at which it is drawn: about its diameter.
 pub const CLOSE: f64 = 0.01;
 
-/// What part of the pair-ticks is to overlap, and what part to be close, per cent: a third, and some more for scenes in
-/// which many shapes are too thin to overlap for long, or have bounds of the oracle that are too far apart to tell.
+/// Wanted share of overlapping and of close pair-ticks, percent: a third, and a reserve for scenes in which many shapes
+/// are too thin to overlap for long, or have oracle bounds too wide to decide.
 const SHARE: u64 = 38;
 
-/// Where a couple is to be.
+/// The wanted relation of a couple.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Regime {
     Overlapping,
@@ -21,13 +21,13 @@ pub enum Regime {
 }
 
 impl Regime {
-    /// Of the couple in this place of a scene, at its start.
+    /// The regime of the couple at this index of a scene, at its start.
     pub fn of(place: usize) -> Self {
         let (close, overlapping) = (Self::Close, Self::Overlapping);
         [close, overlapping, close, overlapping, Self::Free][place % 5]
     }
 
-    /// Whether a couple is where it is to be; `small`: the smaller body's size, metres.
+    /// Whether a couple is in its regime; `small`: the smaller body's size, metres.
     pub fn holds(self, gap: &Bounds, small: f64) -> bool {
         match self {
             Self::Overlapping => gap.depth() > 0.0,
@@ -36,8 +36,8 @@ impl Regime {
         }
     }
 
-    /// A gap to go to, metres: of those that overlap and of a quarter of those that are close, at any order of
-    /// magnitude; of the others evenly within the hundredth.
+    /// A gap to move to, metres: of any order of magnitude for overlapping couples and a quarter of the close ones;
+    /// otherwise uniform within the hundredth.
     pub fn gap(self, rng: &mut Rng, small: f64) -> f64 {
         let part = match self {
             Self::Overlapping => {
@@ -51,7 +51,7 @@ impl Regime {
     }
 }
 
-/// What pair-ticks were, by the oracle.
+/// Number of pair-ticks in each relation, according to the oracle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Shares {
     pub all: u64,
@@ -67,7 +67,7 @@ impl Shares {
         self.close += u64::from(gap.is_within(CLOSE * small));
     }
 
-    /// What these have too little of.
+    /// The regime with the greatest deficit.
     pub fn lacking(&self) -> Regime {
         let free = self.all.saturating_sub(self.overlapping + self.close);
         let kinds = [

@@ -1,4 +1,4 @@
-//! Four engines on the same scene, and the comparison of what they say with the truth.
+//! Four engines on the same scene, and the comparison of their results with the truth.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,27 +22,27 @@ use crate::regimes::Shares;
 use crate::tally::{Fault, Tally};
 use crate::truth::Bounds;
 
-/// Ticks of a scene.
+/// Ticks per scene.
 pub const TICKS: u64 = 24;
 
-/// What was seen so far.
+/// Counters so far.
 #[derive(Default)]
 pub struct Run {
     pub shares: Shares,
     pub fronts: Checked,
     pub tally: Tally,
     undecided: [u64; 4],
-    /// What became of overlaps said to be deeper than the oracle's corners: by [`Search`].
+    /// Results of the depth search for overlaps published as deeper than the oracle's vertices: by [`Search`].
     deeper: [u64; 3],
-    /// Ticks after which the last engine went on and was not done.
+    /// Ticks in which the last engine continued after publishing and did not finish.
     went_on: u64,
-    /// Trees put in place that were built anew.
+    /// Number of rebuilt trees put in place.
     pub trees: u64,
     by_kind: BTreeMap<(usize, usize), u64>,
     within_rounding: u64,
 }
 
-/// What an engine says of a pair.
+/// The published result of an engine for a pair.
 struct Said {
     verdict: Verdict,
     low: f64,
@@ -50,7 +50,7 @@ struct Said {
 }
 
 impl Run {
-    /// A scene of couples of these kinds, for [`TICKS`] ticks.
+    /// Runs a scene of couples of these kinds for [`TICKS`] ticks.
     pub fn scene(&mut self, seed: u64, kinds: &[(usize, usize)]) {
         let mut rng = Rng::new(seed);
         let (mut couples, scene) = any_scene(&mut rng, kinds);
@@ -87,7 +87,7 @@ impl Run {
             self.went_on += u64::from(engines[3].work_on(rng.bits() % 20_000));
             clock.step_each_read(0);
             engines[3].validate().unwrap();
-            // Trees are built from copies of one tick and put in place after another.
+            // Trees are built from copies of one tick and put in place after a later one.
             for (engine, built) in engines.iter_mut().zip(&mut built_trees) {
                 match built.take() {
                     Some(tree) => self.trees += u64::from(engine.take_tree(tree)),
@@ -109,7 +109,7 @@ impl Run {
         for (place, engine) in engines.iter().enumerate() {
             let said = Said::of(engine.outbox(), k);
             if said.low > truth.high + missed {
-                // The search may have missed the best direction: search again before accusing.
+                // The search may have missed the best direction: it searches more densely before a fault is counted.
                 truth = gap_of(a, b, 4_000);
             }
             let tell = |fault: &str| {
@@ -119,7 +119,7 @@ impl Run {
             let above = said.low > truth.high + missed;
             let mut below = said.high < truth.low - noise;
             if said.high < truth.high.min(0.0) - missed {
-                // No point that the oracle knows of is so deep.
+                // The oracle knows no point of this depth.
                 let search = depth_of(a, b, -said.high - missed);
                 self.deeper[search as usize] += 1;
                 below |= search == Search::Refuted;
@@ -133,7 +133,8 @@ impl Run {
             });
             let denied = !matches!(said.verdict, Verdict::Colliding | Verdict::Possible);
             let lost = denied && truth.depth() > missed;
-            // What an exact query cannot tell from touching collides (law 3.4): round shapes are certified to 1e-7.
+            // A pair that an exact query cannot distinguish from a contact collides (law 3.4): round shapes are
+            // certified to 1e-7.
             let touching = said.low <= 0.0 && said.high >= 0.0;
             let within_rounding = touching && said.high - said.low <= 1e-7 * couple.large();
             let made_up =
@@ -145,7 +146,7 @@ impl Run {
             }
             self.undecided[place] += 1;
             if place == 0 {
-                // Without a limit only what cannot be told from touching is left open.
+                // Without a limit only a pair that cannot be distinguished from a contact may be open.
                 self.within_rounding += 1;
                 let least = 1e-9 * couple.large();
                 let told_apart = truth.low > least || truth.depth() > least;
@@ -197,7 +198,7 @@ impl Run {
 }
 
 impl Said {
-    /// Of the couple in a place of the scene.
+    /// The result for the couple at this index of the scene.
     fn of(out: &Outbox, place: usize) -> Self {
         let first = 2 * place as u64 + 1;
         let of_couple = |body_a: u64, body_b: u64| (body_a, body_b) == (first, first + 1);
@@ -232,18 +233,18 @@ impl Said {
     }
 }
 
-/// One tick of each engine, within what each has.
+/// Runs one tick of each engine with its budget.
 fn tick_all(engines: &mut [Engine; 4], inbox: &Inbox, clock: &ManualClock, rng: &mut Rng) {
     let whole = run(&mut engines[0], inbox, clock, Budget::UNLIMITED)
         .tick
         .units;
-    // Often early: then refits of what deforms are cut, too.
+    // Often a small limit, so that refits of deforming bodies are cut off too.
     let most = [0, 1, whole, whole / 8, whole / 30][rng.below(5)];
     let stop = rng.bits() % (most + 1);
     run(&mut engines[1], inbox, clock, Budget::units(stop));
     run(&mut engines[2], inbox, clock, Budget::units(whole / 2));
-    // Each look at the clock takes 100 ns, and sending is said to take 100 us: the work stops anywhere, and time is
-    // left to go on.
+    // Each clock read takes 100 ns, and sending is reported to take 100 us: the work stops anywhere, and there is time
+    // to continue.
     clock.step_each_read(100);
     let budget = Budget::time_ns(100_000 + rng.bits() % (100 * whole + 1));
     run(&mut engines[3], inbox, clock, budget);

@@ -1,16 +1,16 @@
-//! What must not be: counted, and told as it comes.
+//! Faults: counted, and printed when they occur.
 
-/// Faults that are told in full; the others are only counted.
+/// Number of faults printed in full; further ones are only counted.
 const TOLD_MAX: u64 = 10;
 
-/// What can be wrong with what is said of a pair.
+/// Kinds of faults in the result for a pair.
 #[derive(Clone, Copy, Debug)]
 pub enum Fault {
-    /// A collision missed or made up, or a pair left open for no reason.
+    /// A missed or false collision, or a pair left open without a reason.
     Verdict,
-    /// An interval without the truth.
+    /// An interval that excludes the truth.
     Interval,
-    /// Pairs of leaves that a front does not cover just once.
+    /// Leaf pairs that a front does not cover exactly once.
     Cover,
 }
 
@@ -24,7 +24,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// * `count` - how many there are; of 0 nothing is told.
+    /// * `count` - number of faults; for 0 nothing is printed.
     pub fn note(&mut self, fault: Fault, count: u64, tell: impl FnOnce() -> String) {
         if count == 0 {
             return;
@@ -38,7 +38,7 @@ impl Tally {
         }
     }
 
-    /// Panics, with the first in words, if there was any.
+    /// Panics with the text of the first fault, if there was any.
     pub fn assert_none(&self) {
         assert_eq!(
             self.counts,

@@ -1,8 +1,8 @@
-//! The oracle: bounds of the gap of two shapes from their definitions; of convex ones see `directions`.
+//! The oracle: bounds on the gap of two shapes from their definitions; for convex shapes see `directions`.
 //!
-//! How far to trust it: `low` is proved (a direction that separates so far, or the exact distance of all triangles);
-//! `high` is what a search or a polytope inside the shapes found: the truth is at most that for meshes, and for convex
-//! pairs up to what the search of directions missed, which is searched again more densely before anything is accused.
+//! Accuracy: `low` is proved (by a separating direction, or as the exact distance of all triangles). `high` is from a
+//! search, or a polytope inside the shapes: the truth is at most this for meshes, and for convex pairs up to the error
+//! of the search for directions, which is repeated more densely before a fault is counted.
 
 use std::cmp::Ordering;
 
@@ -12,19 +12,20 @@ use crate::directions::of_convex;
 use crate::kinds::Solid;
 use crate::oracle::{Placed, Triangle, crosses, least_overlap, triangle_distance};
 
-/// The gap lies between, metres.
+/// Bounds on the gap, metres.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
     pub low: f64,
     pub high: f64,
-    /// Two triangles cross, and no translation by less than this parts them, metres; 0: none do.
+    /// Least translation that separates some two crossing triangles, metres; 0: no triangles cross.
     pub shared: f64,
-    /// Unit: where the second shape goes for `high` to grow by as much as it goes; `None`: not known.
+    /// Unit direction of motion of the second shape in which `high` grows by as much as the shape moves; `None`:
+    /// unknown.
     pub way: Option<Vec3>,
 }
 
 impl Bounds {
-    /// Of nothing.
+    /// Bounds for no shapes at all.
     pub const FAR: Self = Self::exactly(f64::INFINITY, None);
 
     const fn exactly(gap: f64, way: Option<Vec3>) -> Self {
@@ -36,7 +37,7 @@ impl Bounds {
         }
     }
 
-    /// The same of the two the other way about.
+    /// The same for the two in reverse order.
     fn turned(self) -> Self {
         Self {
             way: self.way.map(|n| -n),
@@ -57,19 +58,19 @@ impl Bounds {
         }
     }
 
-    /// Above zero they overlap, by no less than this, metres: the gap is below zero, or triangles cross (of two solids
-    /// that do no corner need be in the other).
+    /// Positive if they overlap, by at least this, metres: the gap is negative, or triangles cross (two overlapping
+    /// solids may have no vertex inside each other).
     pub fn depth(&self) -> f64 {
         self.shared.max(-self.high)
     }
 
-    /// Proved to be apart, or just touching, by no more than so many metres.
+    /// Whether they are proved to be apart or just touching, with a gap of at most `most` metres.
     pub fn is_within(&self, most: f64) -> bool {
         self.low >= 0.0 && self.high <= most
     }
 }
 
-/// A shape at its place.
+/// A shape and its pose.
 pub type At<'a> = (&'a Solid, Pose);
 
 /// Bounds of the gap of two shapes at poses in one frame.
@@ -88,7 +89,7 @@ pub fn bounds(a: At<'_>, b: At<'_>, samples: u32) -> Bounds {
     }
 }
 
-/// Above a plane: what reaches lowest.
+/// A shape above a plane: its support point towards the plane decides.
 fn over(normal: &Vec3, offset: f64, plane: &Pose, (solid, pose): At<'_>) -> Bounds {
     let n = plane.rotation * normal;
     let down = pose.rotation.inverse_transform_vector(&-n);
@@ -138,7 +139,7 @@ fn of_meshes(a: At<'_>, b: At<'_>) -> Bounds {
             }
         }
         let high = gap.min(held);
-        // What is held does not get out towards what is nearest.
+        // A contained shape does not get out by a motion away from the nearest point.
         let nearest = nearest.filter(|_| held == f64::INFINITY);
         let found = Bounds {
             low: if high <= 0.0 { f64::NEG_INFINITY } else { gap },
@@ -158,8 +159,8 @@ fn of_meshes(a: At<'_>, b: At<'_>) -> Bounds {
     }
 }
 
-/// Where the second of two triangles that are so far apart goes to be farther away: the slope of their distance, which
-/// has no kinks.
+/// Direction of motion of the second triangle that increases the distance of the two: the gradient of their distance,
+/// which is smooth.
 fn away(s: &Triangle, t: &Triangle, distance: f64) -> Option<Vec3> {
     let step = 1e-5 * distance;
     let mut slope = Vec3::zeros();
@@ -172,8 +173,8 @@ fn away(s: &Triangle, t: &Triangle, distance: f64) -> Option<Vec3> {
     slope.try_normalize(0.0)
 }
 
-/// As the oracle's `truth`, with pairs of triangles passed over whose boxes alone keep them farther apart than what is
-/// known, and corners outside the other's box.
+/// As the oracle's `truth`, but skips pairs of triangles whose boxes are farther apart than the known distance, and
+/// vertices outside the other's box.
 fn truth(a: &Placed, b: &Placed) -> Bounds {
     let of = |t: &[Point]| {
         let ends = (t[0], t[0]);
@@ -228,7 +229,7 @@ fn truth(a: &Placed, b: &Placed) -> Bounds {
     Bounds::exactly(distance, nearest.and_then(|(s, t)| away(s, t, distance)))
 }
 
-/// Corners that triangles have in common, once.
+/// Vertices of the triangles, without duplicates.
 fn each_once(corners: &[Point]) -> Vec<Point> {
     let mut all = corners.to_vec();
     all.sort_unstable_by(|p, q| {

@@ -1,4 +1,4 @@
-//! The box of a continuous body holds it all the way.
+//! The swept box of a continuous body contains it during the whole motion.
 
 use sweepd::math::{Pose, Vec3};
 use sweepd::wire::frame_flags;
@@ -19,7 +19,7 @@ fn a_swept_box_holds_every_point_all_the_way_and_is_tight_again_in_the_next_tick
         for case in 0..300 {
             let far = 10.0_f64.powf(rng.range(-2.0, 6.0));
             let size = bullet.radius * 10.0_f64.powf(rng.range(-1.0, 3.0));
-            // Some turn by more than half a turn, which their sender declares.
+            // Some turn by more than half a turn, which is declared by their velocity.
             let turns = if case % 3 == 0 {
                 rng.range(0.6, 3.0)
             } else {
@@ -58,7 +58,7 @@ fn a_swept_box_holds_every_point_all_the_way_and_is_tight_again_in_the_next_tick
                     }
                 }
             }
-            // Never larger than the ball about the centre's way.
+            // The box is never larger than that of the bounding ball along the path of the centre.
             let ball = motion.travel.abs()
                 + Vec3::repeat(2.0 * bullet.radius * (1.0 + 1e-9) + 1e-12 * far);
             assert!(

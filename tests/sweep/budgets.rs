@@ -1,4 +1,4 @@
-//! With whatever budget: a touch on the way is told as a hit or as open, and what is no touch never as a hit.
+//! At any budget a contact during a motion is published as a hit or as open, and a free motion never as a hit.
 
 use sweepd::time::Budget;
 use sweepd::wire::{State, pair_flags};
@@ -26,7 +26,7 @@ fn with_any_budget_a_bullet_is_a_hit_or_open_and_with_enough_a_hit() {
             let (plate, motion, share) = shot(&mut rng, 10.0);
             let up = plate.pose.rotation * sweepd::math::Vec3::z();
             let ahead = 1.01 * (bullet.radius + 2.0 * HALF.z) / up.dot(&motion.travel).abs();
-            // What is in the wall from the first is no news.
+            // A body that starts or ends in contact with the wall is no new hit.
             if ahead > share || ahead > 1.0 - share {
                 continue;
             }
@@ -91,7 +91,7 @@ fn with_any_budget_what_does_not_touch_is_no_hit() {
 
 #[test]
 fn sweeps_leave_verdicts_half_of_the_budget() {
-    // Many bullets graze, and two balls rest in one another: their verdict does not starve.
+    // Many bullets graze, and two balls overlap at rest: sweeps must not starve the verdict of the balls.
     let mut bodies = vec![crate::rig::ball(1, 0.0, ""), crate::rig::ball(2, 1.5, "")];
     for k in 0..20_u64 {
         let shape = "{ type = \"capsule\", radius = 0.01, half_height = 0.2 }";
@@ -120,7 +120,7 @@ fn sweeps_leave_verdicts_half_of_the_budget() {
     }
 }
 
-/// Rounds began with the same pairs in each tick, with turns too short for what takes many looks.
+/// Each round began with the same pairs, with turns too short for motions that need many tests.
 #[test]
 fn bug_of_many_ways_and_little_budget_the_same_were_open_in_each_tick() {
     const SHOTS: u64 = 12;

@@ -1,4 +1,4 @@
-//! Cases whose answer is known by hand.
+//! Cases with answers computed by hand.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -27,7 +27,7 @@ fn open(row: &PairRow) -> bool {
     row.flags & pair_flags::SWEPT_OPEN != 0
 }
 
-/// A hit at a share of the motion, which is told as nearly as wanted.
+/// Asserts a hit at a share of the motion, with an interval of at most the given width.
 pub fn is_near(row: &PairRow, toi: f64, close: f64) {
     assert!(hit(row), "{row:?}");
     assert!(
@@ -38,7 +38,7 @@ pub fn is_near(row: &PairRow, toi: f64, close: f64) {
     );
 }
 
-/// A plate in the plane z = 0, and a ball of 10 mm above it.
+/// A plate in the plane z = 0, and a ball of radius 10 mm above it.
 pub fn plate(more: &str) -> Rig {
     let mut rig = Rig::new(&scene(
         "",
@@ -193,10 +193,10 @@ fn two_bullets_that_pass_through_each_other_touch_half_way() {
     rig.place(1, &at(50.0, 0.0, 0.0));
     rig.place(2, &at(0.0, -50.0, 0.0));
     rig.send(ALL);
-    // They close along the diagonal: 100 sqrt(2) m in all.
+    // They approach along the diagonal: 100 sqrt(2) m in total.
     let toi = 0.5 - 0.02 / (100.0 * 2.0_f64.sqrt());
     is_near(rig.pair(1, 2).unwrap(), toi, 1e-9);
-    // Side by side they keep their distance, however fast.
+    // Side by side they keep their distance at any speed.
     rig.place(1, &at(50.0, 99.97, 0.0));
     rig.place(2, &at(0.0, 0.0, 0.0));
     rig.epoch += 1;
@@ -219,7 +219,7 @@ fn frames_skipped_between_two_ticks_are_swept_too() {
             ],
         ));
         rig.send(ALL);
-        // Down through it and back within one tick.
+        // Down through the plate and back within one tick.
         let height = [-5.0, 5.0];
         rig.send_several(2, |k, rig| rig.place(2, &at(0.0, 0.0, height[k])), ALL);
         let top = if wall == PLATE { 0.0105 } else { 0.01 };
@@ -255,7 +255,7 @@ fn a_body_that_hangs_on_one_with_more_poses_than_are_kept_is_open_too() {
         ],
     ));
     rig.send(ALL);
-    // In one pose alone it is near the ball, and that is not kept.
+    // In only one pose it is near the ball, and that pose is not kept.
     let height = |k| if k == LEGS_MAX + 2 { 7.0 } else { 0.0 };
     rig.send_several(
         LEGS_MAX + 4,
@@ -265,7 +265,7 @@ fn a_body_that_hangs_on_one_with_more_poses_than_are_kept_is_open_too() {
     assert!(open(rig.pair(1, 3).unwrap()), "{:?}", rig.pair(1, 3));
 }
 
-/// What it hangs on takes no part, or is a plane: it goes the same way all the same.
+/// Its parent is disabled or a half-space; the body moves with it nevertheless.
 #[test]
 fn bug_a_body_that_hangs_on_one_that_is_disabled_or_a_half_space_goes_its_way() {
     let bullet = "name = \"b3\"\nid = 3\nattached_to = \"b2\"\nposition = [0.0, 0.0, 0.1]\ncontinuous = true\n\
@@ -284,7 +284,7 @@ fn bug_a_body_that_hangs_on_one_that_is_disabled_or_a_half_space_goes_its_way() 
                 bullet.to_owned(),
             ],
         ));
-        // The first pose is no motion, from wherever the scene had it.
+        // The first received pose is not a motion, whatever the pose in the scene.
         rig.place(2, &at(0.0, 0.0, -1.1));
         rig.send(ALL);
         assert!(rig.pair(1, 3).is_none(), "{:?}", rig.pair(1, 3));
@@ -301,7 +301,7 @@ fn bug_a_body_that_hangs_on_one_that_is_disabled_or_a_half_space_goes_its_way() 
     }
 }
 
-/// A rod of 2 m through the origin, which turns about x, and a small ball on the y axis.
+/// A rod of length 2 m through the origin that turns about x, and a small ball on the y axis.
 fn rod(more: &str) -> Rig {
     let rod = "{ type = \"capsule\", radius = 0.001, half_height = 1.0 }";
     Rig::new(&scene(
@@ -322,21 +322,21 @@ fn a_declared_spin_adds_the_turns_that_the_poses_do_not_show() {
         rig.velocities = vec![still, still];
         rig.send(ALL);
         let spin = turns * TAU / (FRAME_NS as f64 * 1e-9);
-        // Off by a tenth of a turn: the poses say which.
+        // The velocity is off by a tenth of a turn: the poses determine the exact angle.
         let said = spin * (1.0 + 0.1 / turns);
         rig.velocities = vec![still, [0.0, 0.0, 0.0, said, 0.0, 0.0]];
         rig.place(2, &Pose::rotation(Vec3::x() * (turns * TAU)));
         rig.send(ALL);
         is_near(rig.pair(1, 2).unwrap(), ball_at / (turns.abs() * TAU), 1e-6);
     }
-    // What is not declared is the shortest turn: none.
+    // Without a declared velocity the shortest rotation is used: none.
     let mut rig = rod(SWEPT);
     rig.send(ALL);
     rig.send(ALL);
     assert_eq!(rig.state(), State::Clear);
 }
 
-/// It was given up after 160 looks, whatever time there was; and a turn that ends as it began had no axis.
+/// It was given up after 160 tests regardless of the time left; and a rotation that ends at its start had no axis.
 #[test]
 fn bug_what_spins_close_beside_another_is_decided_where_there_is_time() {
     let ball = "{ type = \"sphere\", radius = 0.04 }";
@@ -369,7 +369,7 @@ fn bug_what_spins_close_beside_another_is_decided_where_there_is_time() {
             } else {
                 assert!(hit(rig.pair(1, 2).unwrap()), "{what}");
             }
-            // With little it is as open as ever.
+            // With a small budget it is still open.
             rig.place(2, &at(0.0, 0.0, -0.06 - clear_m));
             rig.send(Budget::units(40));
             let told = rig.pair(1, 2).map_or(0, |row| row.flags);
@@ -407,7 +407,7 @@ fn a_step_beyond_the_limit_is_a_teleport_and_told() {
     rig.place(2, &at(0.0, 0.0, 15.0));
     rig.send(ALL);
     assert!(hit(rig.pair(1, 2).unwrap()));
-    // Jumped and went on within one tick: what it went is swept.
+    // A jump and a motion within one tick: the motion is swept.
     let z = [-20.0, 5.0, -5.0];
     rig.send_several(3, |k, rig| rig.place(2, &at(0.0, 0.0, z[k])), ALL);
     let row = rig.pair(1, 2).unwrap();
@@ -427,7 +427,7 @@ fn a_reset_and_a_first_pose_are_no_motion() {
 
 #[test]
 fn an_attached_body_goes_the_way_of_the_body_it_hangs_on() {
-    // A ball at the end of an arm of 2 m, which turns by 120 degrees about z; a ball on its circle at 60 degrees.
+    // A ball at the end of an arm of 2 m that turns by 120 degrees about z; another ball on its circle at 60 degrees.
     let third = TAU / 3.0;
     let on_circle = Quat::from_scaled_axis(Vec3::z() * (third / 2.0)) * Vec3::x() * 2.0;
     let mut rig = Rig::new(&scene(
@@ -443,7 +443,7 @@ fn an_attached_body_goes_the_way_of_the_body_it_hangs_on() {
     rig.send(ALL);
     rig.place(2, &Pose::rotation(Vec3::z() * third));
     rig.send(ALL);
-    // The chord of two radii between the centres: 0.02 m at 2 m.
+    // The chord between the centres at contact is 0.02 m, at a radius of 2 m.
     let half = (0.01_f64 / 2.0).asin();
     let toi = (third / 2.0 - 2.0 * half) / third;
     is_near(rig.pair(1, 3).unwrap(), toi, 1e-9);
@@ -454,7 +454,7 @@ fn an_attached_body_goes_the_way_of_the_body_it_hangs_on() {
 
 #[test]
 fn bug_an_attached_body_was_held_against_the_step_of_the_body_it_hangs_on() {
-    // A ball 5 m along x from the body that it hangs on, and a wall in the plane x = 5.5.
+    // A ball attached 5 m along x from its parent, and a wall in the plane x = 5.5.
     let wall = "{ type = \"box\", half_extents = [0.01, 5.0, 5.0] }";
     let arm = "{ type = \"sphere\", radius = 0.1 }";
     let mut rig = Rig::new(&scene(
@@ -468,7 +468,7 @@ fn bug_an_attached_body_was_held_against_the_step_of_the_body_it_hangs_on() {
         ],
     ));
     rig.send(ALL);
-    // The other steps 3 m up and turns down by as much as makes the ball step one metre along x.
+    // The parent moves up by 3 m and tilts down such that the ball moves one metre along x.
     let tilt = (3.0_f64 / 5.0).asin();
     let x = 6.0 - 5.0 * tilt.cos();
     let down = Quat::from_scaled_axis(Vec3::y() * tilt);
@@ -476,7 +476,7 @@ fn bug_an_attached_body_was_held_against_the_step_of_the_body_it_hangs_on() {
     rig.send(ALL);
     assert!(hit(rig.pair(1, 3).unwrap()));
     assert!(rig.because(Reason::Swept) && !rig.because(Reason::Teleported));
-    // Back to x = 2, and again: now it steps by 3 m, and the other by none.
+    // Back to x = 2, then again: now the ball moves by 3 m, and its parent does not move.
     rig.place(2, &Pose::identity());
     rig.send(ALL);
     let aside = Quat::from_scaled_axis(Vec3::z() * (1.5_f64 / 5.0).asin() * 2.0);
@@ -536,7 +536,7 @@ fn a_body_that_is_not_continuous_is_where_the_tick_has_it() {
 
 #[test]
 fn a_touch_on_the_way_of_an_undecided_pair_is_a_begin() {
-    // It ends so that the verdict has no budget left, but the way has.
+    // The motion ends such that the budget suffices for the sweep, but not for the verdict.
     let mut rig = plate(SWEPT);
     rig.place(2, &at(0.0, 0.0, -0.0104));
     rig.send(ALL);
@@ -544,7 +544,7 @@ fn a_touch_on_the_way_of_an_undecided_pair_is_a_begin() {
     assert!(hit(row) && has(row, Event::Begin), "{row:?}");
 }
 
-/// A thousand kilometres out a way is known to some nanometres; the poses at its ends are known to the last digit.
+/// A thousand kilometres from the origin a motion is known to a few nanometres; the poses at its ends are exact.
 #[test]
 fn bug_a_ball_that_stops_a_nanometre_before_another_never_touched_it() {
     let shape = "{ type = \"sphere\", radius = 0.5 }";
@@ -583,7 +583,7 @@ fn bug_a_ball_that_stops_a_nanometre_before_another_never_touched_it() {
     }
 }
 
-/// What was certified colliding, then not decided, was taken for a collision that goes on.
+/// A pair that was certified as colliding and then undecided counted as a continued collision.
 #[test]
 fn bug_a_touch_at_poses_that_were_not_decided_is_news() {
     let ball = "{ type = \"sphere\", radius = 0.5 }";
@@ -602,7 +602,7 @@ fn bug_a_touch_at_poses_that_were_not_decided_is_news() {
         rig.move_x(1, 0.2);
         rig.move_x(2, 3.0);
         rig.send(budget);
-        // The one goes to where the other was, which goes on from there.
+        // The first ball moves to where the second was, and the second moves on.
         rig.move_x(1, 3.1);
         rig.move_x(2, 9.0);
         rig.send(ALL);
@@ -611,7 +611,7 @@ fn bug_a_touch_at_poses_that_were_not_decided_is_news() {
     }
 }
 
-/// So was a touch on the way to poses that were not decided.
+/// So did a contact during a motion to poses that were not decided.
 #[test]
 fn bug_a_touch_at_poses_that_a_way_led_to_undecided_is_news() {
     let mut undecided = 0;
@@ -631,14 +631,14 @@ fn bug_a_touch_at_poses_that_a_way_led_to_undecided_is_news() {
     assert!(undecided > 0);
 }
 
-/// They met on the way, and were apart again at the poses that it led to, of which that tick did not know.
+/// They touched during the motion, and were apart at the final poses, which that tick did not decide.
 #[test]
 fn bug_the_end_of_a_touch_on_the_way_was_told_as_later_than_it_may_have_been() {
     let mut undecided = 0;
     for units in 0..80 {
         for removed in [false, true] {
             let mut rig = plate(SWEPT);
-            // Its own box tells nothing of a plate that leans.
+            // The box of a tilted plate does not separate the pair.
             let lean = Quat::from_scaled_axis(Vec3::x() * 0.5);
             let along = |z: f64| Pose::from(lean * Vec3::new(0.3, 0.2, z));
             rig.place(1, &Pose::from_parts(Vec3::zeros().into(), lean));

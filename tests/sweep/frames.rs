@@ -1,5 +1,5 @@
-//! Several frames in one tick: bodies are where the frames have them, each at its time, whichever bodies a frame holds;
-//! and where no frame says where the one was while the other went, nothing is certified.
+//! Several frames in one tick: bodies are at the poses of the frames at the times of these, whichever bodies a frame
+//! contains. If no frame has the pose of one body while the other moves, nothing is certified.
 
 use std::f64::consts::TAU;
 
@@ -12,10 +12,10 @@ use crate::rig::{ALL, FRAME_NS, Rig, body, has, row, scene};
 const FULL: u32 = frame_flags::FULL;
 const PARTIAL: u32 = frame_flags::PARTIAL;
 
-/// Two that cross at right angles at one speed: they touch when each is so far before the crossing, of 20 m.
+/// Two bodies that cross at right angles at equal speed touch when each is this share of its 20 m along.
 const MET: f64 = 0.5 - 0.02 / (20.0 * std::f64::consts::SQRT_2);
 
-/// A frame: source, flags, and where it has which bodies.
+/// A frame: source, flags, and positions of bodies.
 type Sent<'a> = (&'static str, u32, &'a [(u64, [f64; 2])]);
 
 fn rows_of(places: &[(u64, [f64; 2])]) -> Vec<TransformRow> {
@@ -23,7 +23,7 @@ fn rows_of(places: &[(u64, [f64; 2])]) -> Vec<TransformRow> {
     places.iter().map(at).collect()
 }
 
-/// One tick of these frames.
+/// Runs one tick with these frames.
 fn tick(rig: &mut Rig, frames: &[Sent<'_>]) {
     let set = |at: usize, rig: &mut Rig| {
         let (source, flags, places) = frames[at];
@@ -33,7 +33,7 @@ fn tick(rig: &mut Rig, frames: &[Sent<'_>]) {
     rig.send_several(frames.len(), set, ALL);
 }
 
-/// Two bullets, 10 m before a crossing; the second of another source, or of the same.
+/// Two bullets, 10 m before a crossing; the second with another source, or the same.
 fn crossing(other: &str) -> Rig {
     let head = "[[source]]\nname = \"gun\"\ntimeout_ms = 500\n";
     let of = |source: &str| format!("{SWEPT}\nsource = \"{source}\"");
@@ -42,7 +42,7 @@ fn crossing(other: &str) -> Rig {
     Rig::new(&scene(head, &bodies))
 }
 
-/// As [`crossing`], both known.
+/// As [`crossing`], with both poses known.
 fn before_the_crossing(other: &'static str) -> Rig {
     let mut rig = crossing(other);
     let (one, two) = ((1, [-10.0, 0.0]), (2, [0.0, -10.0]));
@@ -86,7 +86,7 @@ fn bug_a_crossing_was_missed_where_a_later_frame_had_one_of_the_two_alone() {
         assert!(has(met(&rig), Event::Passed));
         assert_eq!(rig.state(), State::Colliding);
     }
-    // A frame of neither divides the tick, too; and is no reason to doubt.
+    // A frame without either of the two divides the tick too, and is no reason for doubt.
     let mut rig = before_the_crossing("feed");
     let third: &[_] = &[(3, [80.0, 0.0])];
     tick(
@@ -114,7 +114,7 @@ fn bug_a_crossing_was_missed_where_the_row_of_one_was_refused_in_a_later_frame()
     assert_eq!(rig.state(), State::Colliding);
 }
 
-/// It stood where it was seen last, as if it were told to be there, for the frames behind the one that lost it.
+/// For the frames after the one with the invalid pose, the body counted as being at its last pose.
 #[test]
 fn bug_a_body_whose_pose_was_refused_was_certainly_touched_where_it_was_before() {
     let mut rig = before_the_crossing("feed");
@@ -142,7 +142,7 @@ fn bug_a_crossing_was_missed_where_one_came_in_with_the_first_of_several_frames(
         ],
     );
     is_near(met(&rig), (1.0 + MET) / 2.0, 1e-9);
-    // The pose that it came in with is no motion: what the other did before is no meeting with it.
+    // The first pose is not a motion: the earlier motion of the other body cannot touch it.
     let mut rig = crossing("feed");
     tick(&mut rig, &[("feed", FULL, &[(1, [-10.0, 0.0])])]);
     tick(
@@ -165,7 +165,7 @@ fn bug_two_that_went_one_after_the_other_were_certified_to_meet() {
             ("feed", PARTIAL, &[(2, [0.0, 10.0])]),
         ],
     );
-    // No frame says where the second was while the first went: it is no hit, and not clear.
+    // No frame has the pose of the second body while the first moves: it is neither a hit nor clear.
     assert!(!is_hit(&rig) && is_open(&rig), "{:?}", rig.pair(1, 2));
     assert_eq!(rig.state(), State::Possible);
     assert!(!has(met(&rig), Event::Begin));
@@ -177,7 +177,7 @@ fn what_goes_alone_is_certified_whatever_the_others_frames_are() {
         let mut rig = before_the_crossing(other);
         tick(&mut rig, &[(other, PARTIAL, &[(2, [0.0, 0.0])])]);
         assert_eq!(rig.state(), State::Clear, "{other}");
-        // The second stands in the way of the first, and repeats its pose, or does not.
+        // The second body is in the way of the first, with or without repeated poses.
         let stands: Sent<'_> = (other, PARTIAL, &[(2, [0.0, 0.0])]);
         let goes: Sent<'_> = ("feed", PARTIAL, &[(1, [10.0, 0.0])]);
         tick(&mut rig, &[stands, goes, stands, stands]);
@@ -196,7 +196,7 @@ fn of_two_sources_the_ways_between_one_frame_each_are_in_step() {
 
 #[test]
 fn bug_of_two_sources_with_several_frames_a_meeting_was_certified_or_ruled_out_at_will() {
-    // Two frames of the one and one of the other, or two: nobody says which goes with which.
+    // Two frames of one source, and one or two of the other: nothing relates their times.
     for frames in [1, 2] {
         for mid in [-9.0, 0.0, 9.0] {
             let mut rig = before_the_crossing("gun");
@@ -215,7 +215,7 @@ fn bug_of_two_sources_with_several_frames_a_meeting_was_certified_or_ruled_out_a
             assert_eq!(rig.state(), State::Possible);
         }
     }
-    // Whose ways are apart is clear of the other in any order: beside one another, or far from one another.
+    // Bodies with separate paths are clear in any order of frames: with parallel paths, or far apart.
     for aside in [[10.0, 9.9], [-10.0, -10.0]] {
         let mut rig = before_the_crossing("gun");
         tick(
@@ -230,7 +230,7 @@ fn bug_of_two_sources_with_several_frames_a_meeting_was_certified_or_ruled_out_a
     }
 }
 
-/// A pause says that the pose still holds: the time that it covers was taken for time in which the body turned.
+/// A pause means that the pose is still valid; its duration counted as time in which the body turned.
 #[test]
 fn bug_a_body_was_certified_to_turn_through_another_while_it_was_paused() {
     const PAUSES: u64 = 49;
@@ -243,7 +243,7 @@ fn bug_a_body_was_certified_to_turn_through_another_while_it_was_paused() {
                 body(2, [0.0; 3], rod, SWEPT),
             ],
         ));
-        // A turn in 25 frames.
+        // One turn in 25 frames.
         let spin = TAU / (25.0 * FRAME_NS as f64 * 1e-9);
         let still = [0.0; 6];
         rig.velocities = vec![still, [0.0, 0.0, 0.0, spin, 0.0, 0.0]];
@@ -260,11 +260,11 @@ fn bug_a_body_was_certified_to_turn_through_another_while_it_was_paused() {
         (rig.flags, rig.unstamped) = (FULL, false);
         rig.send(ALL);
         assert_eq!(rig.state(), State::Clear, "{:?}", rig.pair(1, 2));
-        // From there on it turns again: a whole turn, and past the ball, in 25 frames.
+        // From here on it turns again: a whole turn in 25 frames, past the ball.
         rig.seq += 24;
         rig.send(ALL);
         assert!(is_hit(&rig), "{:?}", rig.pair(1, 2));
-        // Once more from a pause, whose time is said: since then a whole turn.
+        // Again after a pause with a timestamp: a whole turn since the pause.
         if !unstamped {
             let (rows, velocities) = (rig.rows.clone(), rig.velocities.clone());
             rig.rows.clear();

@@ -1,5 +1,4 @@
-//! What a body went before its place was lost in the same tick, by a reset or a pose that is refused, is asked for as
-//! any other way.
+//! The motion of a body that loses its pose in the same tick, by a reset or an invalid pose, is swept like any other.
 
 use sweepd::math::Pose;
 use sweepd::wire::{
@@ -29,7 +28,7 @@ fn bug_a_touch_before_a_reset_in_the_same_tick_was_told_as_clear() {
     };
     rig.send_several(2, frame, ALL);
     let row = rig.pair(1, 2).unwrap();
-    // Two legs: the way through the plate, and the step over the reset, of which nothing is asked.
+    // Two legs: the motion through the plate, and the step at the reset, which is not swept.
     is_near(row, (5.0 - 0.0105) / 10.0 / 2.0, 1e-9);
     assert!(has(row, Event::Passed) && row.flags & pair_flags::TELEPORTED == 0);
     assert_eq!(rig.state(), State::Colliding);
@@ -83,13 +82,13 @@ fn what_a_reset_puts_into_a_wall_was_not_hit_on_its_way() {
 
 #[test]
 fn bug_a_touch_before_a_refused_pose_in_the_same_tick_was_never_told() {
-    // Through it, and through it and back.
+    // Through the plate, and through it and back.
     for heights in [&[-5.0, f64::NAN][..], &[-5.0, 5.0, f64::NAN]] {
         let mut rig = plate(SWEPT);
         let frame = |k: usize, rig: &mut Rig| rig.place(2, &at(heights[k]));
         rig.send_several(heights.len(), frame, ALL);
         let row = rig.pair(1, 2).unwrap();
-        // It has begun, and where it is now is not known: whether it has ended is not certain.
+        // The contact has begun; the current pose is unknown, so that its end is uncertain.
         assert!(hit(row) && has(row, Event::Begin) && !has(row, Event::End));
         assert_eq!(rig.verdict(1, 2), Verdict::Possible);
         rig.send(ALL);
@@ -103,7 +102,7 @@ fn bug_a_touch_before_a_refused_pose_in_the_same_tick_was_never_told() {
     }
 }
 
-/// A plate, a body that may pass it by, and a continuous ball that hangs on it and may not.
+/// A plate, a body that ignores it, and an attached continuous ball that does not.
 fn carrier(more: &str) -> Rig {
     let ball = "name = \"b3\"\nid = 3\nattached_to = \"b2\"\nposition = [0.0, 0.2, 0.0]\ncontinuous = true\n\
                 shape = { type = \"sphere\", radius = 0.05 }";
@@ -144,7 +143,7 @@ fn bug_what_hangs_on_a_body_was_not_followed_from_its_first_pose_of_a_tick() {
             }
         }
     }
-    // Where the one it hangs on comes from far, that is no motion of either.
+    // A jump of the parent at a reset is not a motion of either body.
     let mut rig = carrier(SWEPT);
     rig.place(2, &at(5.0));
     rig.send(ALL);
@@ -190,14 +189,14 @@ fn bug_what_went_on_its_way_in_a_frame_that_is_too_old_by_now_was_never_asked() 
         assert!(hit(row), "{row:?}");
         assert!(rig.because(Reason::Swept));
         assert_eq!(rig.state(), State::Colliding);
-        // Its box makes no more pairs than it has.
+        // Its box makes no more pairs than before.
         rig.waited_ns = 0;
         rig.send(ALL);
         assert_eq!(rig.state(), State::Clear);
     }
 }
 
-/// A stall lets frames come together of which the first is too old by now.
+/// After a stall two frames arrive together, and the first is too old.
 #[test]
 fn bug_a_frame_too_old_took_a_body_out_of_the_tick_whose_younger_one_it_is() {
     let wall = body(1, [0.0; 3], PLATE, "").replace("moves = true", "moves = false");
@@ -216,7 +215,7 @@ fn bug_a_frame_too_old_took_a_body_out_of_the_tick_whose_younger_one_it_is() {
     rig.send(ALL);
     assert_eq!(rig.state(), State::Clear);
 
-    // What lies in contact meanwhile goes on to do so.
+    // A body in contact stays in contact meanwhile.
     rig.place(2, &at(0.005));
     rig.send(ALL);
     let frame = |k: usize, rig: &mut Rig| {
@@ -261,7 +260,7 @@ fn bug_the_way_on_which_a_body_was_removed_by_its_age_was_never_asked() {
     assert_eq!(rig.state(), State::Clear);
 }
 
-/// A wall that stands, a body that goes, one that hangs on it, and another of the same source.
+/// A fixed wall, a moving body, a body attached to it, and another body of the same source.
 fn reset_on_its_way(more: &str) -> Rig {
     let still = |text: String| text.replace("moves = true", "moves = false");
     let hangs = format!("{SWEPT}\nattached_to = \"b2\"");
@@ -302,7 +301,8 @@ fn cloth_of(epoch: u64, version: u64) -> VertexFrame {
     }
 }
 
-/// The tick in which body 2 went through the wall and was reset, the next one, and the first that knows all again.
+/// Asserts the tick in which body 2 went through the wall and was reset, the next one, and the first with all poses
+/// known.
 fn its_way_was_asked(rig: &mut Rig, cause: EndCause) {
     for id in [2, 3] {
         let row = rig.pair(1, id).unwrap_or_else(|| panic!("no row of {id}"));
@@ -379,7 +379,7 @@ fn bug_the_way_before_an_epoch_whose_first_pose_is_refused_was_never_asked() {
     its_way_was_asked(&mut rig, EndCause::Reset);
 }
 
-/// What is too old takes no part, and where it goes from then on is no motion.
+/// A body with a stale pose takes no part, and its next pose is not a motion.
 #[test]
 fn bug_the_way_before_an_epoch_whose_poses_are_too_old_was_never_asked() {
     for late in [1, 2] {
@@ -392,7 +392,7 @@ fn bug_the_way_before_an_epoch_whose_poses_are_too_old_was_never_asked() {
         rig.send_several(1 + late, frame, ALL);
         assert!(rig.because(Reason::RemovedByAge));
         let row = *rig.pair(1, 2).unwrap();
-        // One way of two or three.
+        // One leg of two or three.
         let share = (5.0 - 0.0105) / 10.0 / (1 + late) as f64;
         is_near(&row, share, 1e-9);
         its_way_was_asked(&mut rig, EndCause::SourceLost);
@@ -402,7 +402,7 @@ fn bug_the_way_before_an_epoch_whose_poses_are_too_old_was_never_asked() {
 #[test]
 fn what_a_reset_leaves_without_a_pose_is_asked_for_no_way_that_it_did_not_go() {
     let mut rig = reset_on_its_way("");
-    // It stands above the wall, and the new epoch, which has it below, waits.
+    // It is above the wall, and the frame of the new epoch, with a pose below the wall, waits.
     let frame = |k: usize, rig: &mut Rig| {
         (rig.epoch, rig.scene_rev) = (1 + k as u64, 99 * k as u64);
         rig.place(2, &at([5.0, -5.0][k]));
@@ -410,7 +410,7 @@ fn what_a_reset_leaves_without_a_pose_is_asked_for_no_way_that_it_did_not_go() {
     rig.send_several(2, frame, ALL);
     assert!(rig.pair(1, 2).is_none() && rig.pair(1, 3).is_none());
     assert_eq!(rig.state(), State::Unknown);
-    // What lay in contact ends with the reset, at once.
+    // A contact ends with the reset, at once.
     let mut rig = reset_on_its_way("");
     rig.place(2, &at(0.005));
     rig.send(ALL);
@@ -433,7 +433,7 @@ fn a_wall_that_is_lost_in_the_tick_in_which_something_passes_it_was_there_before
     let row = rig.pair(1, 2).unwrap();
     assert_eq!(row.flags & pair_flags::SWEPT_OPEN, pair_flags::SWEPT_OPEN);
     assert_eq!(rig.verdict(1, 2), Verdict::Possible);
-    // Where it was says nothing afterwards.
+    // Afterwards its old pose has no meaning.
     let mut rig = plate(SWEPT);
     rig.place(1, &at(f64::NAN));
     rig.send(ALL);
@@ -442,7 +442,7 @@ fn a_wall_that_is_lost_in_the_tick_in_which_something_passes_it_was_there_before
     assert!(rig.pair(1, 2).is_none());
 }
 
-/// It was swept with the turn of its velocity since the stamp of what it had hung on, past what it touches.
+/// It was swept with the rotation of its velocity since the stamp of its former parent, past the body that it touches.
 #[test]
 fn bug_the_first_way_of_a_body_let_go_was_turned_by_a_stamp_of_another() {
     let sphere = |radius: f64| format!("{{ type = \"sphere\", radius = {radius} }}");
@@ -467,14 +467,14 @@ fn bug_the_first_way_of_a_body_let_go_was_turned_by_a_stamp_of_another() {
     };
     rig.edit(vec![let_go], ALL);
     rig.rows.push(row(2, &Pose::translation(0.0, 1.0, 0.0)));
-    // A whole turn from frame to frame.
+    // One turn per frame.
     let spin = std::f64::consts::TAU / (FRAME_NS as f64 * 1e-9);
     rig.velocities = vec![[0.0; 6], [0.0, 0.0, 0.0, 0.0, 0.0, spin]];
     rig.send(ALL);
     let row = rig.pair(2, 3).unwrap();
     assert!(hit(row), "{row:?}");
     is_near(row, 0.24, 1e-9);
-    // From now on its own stamps say how far it turns.
+    // From now on its own stamps determine the rotation.
     rig.place(2, &Pose::translation(0.0, -1.0, 0.0));
     rig.send(ALL);
     assert!(rig.pair(2, 3).is_none_or(|row| !hit(row)));

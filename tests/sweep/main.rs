@@ -1,6 +1,6 @@
-//! Goal: what a continuous body touches between two poses is never missed, and when it touched is right. Method: bodies
-//! through thin walls by the thousand and cases whose answer is known by hand, against a motion and distances of their
-//! own (`truth`); budgets from nothing to enough.
+//! Goal: a contact of a continuous body between two poses is never missed, and its time is right. Method: thousands of
+//! bodies through thin walls, and cases with answers computed by hand, compared with independent code for motions and
+//! distances (`truth`); budgets from nothing to enough.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,

@@ -1,4 +1,4 @@
-//! Two bodies that both go and turn, of boxes, meshes and both together, against samples of the motion with exact
+//! Two bodies that both move and turn, of boxes, meshes and both together, compared with samples of the motion by exact
 //! predicates on triangles.
 
 use sweepd::math::{Point, Pose, Vec3};
@@ -13,10 +13,10 @@ use crate::truth::Motion;
 const CASES: usize = if cfg!(debug_assertions) { 60 } else { 600 };
 const SAMPLES: u32 = 150;
 
-/// The boxes of a body: half sides and place in the body.
+/// The boxes of a body: half sides and position in the body.
 type Parts = Vec<(Vec3, Vec3)>;
 
-/// A body as text: a box, a mesh of it, or several of both.
+/// A body as text: a box, a mesh of it, or several shapes of both kinds.
 fn shapes(rng: &mut Rng, kind: usize) -> (String, Parts) {
     let mut side = || {
         Vec3::new(
@@ -25,7 +25,7 @@ fn shapes(rng: &mut Rng, kind: usize) -> (String, Parts) {
             rng.range(0.02, 0.3),
         )
     };
-    // About the origin, so that the centre of the geometry, which goes straight, is that of the body.
+    // Centred at the origin, so that the centre of the geometry, which moves in a straight line, is the body's origin.
     let parts: Parts = match kind {
         0 | 1 => vec![(side(), Vec3::zeros())],
         _ => vec![
@@ -52,7 +52,7 @@ fn shapes(rng: &mut Rng, kind: usize) -> (String, Parts) {
     (format!("[{}]", all.join(", ")), parts)
 }
 
-/// The parts at a share of the motion, seen from a point near by.
+/// The parts at a share of the motion, relative to a nearby point.
 fn placed(parts: &Parts, motion: &Motion, s: f64, from: &Vec3) -> Vec<Placed> {
     let parts = parts.iter().map(|(half, place)| {
         let soup = cuboid(*half);
@@ -69,7 +69,7 @@ fn placed(parts: &Parts, motion: &Motion, s: f64, from: &Vec3) -> Vec<Placed> {
     parts.collect()
 }
 
-/// Distance, or 0 where they overlap.
+/// The distance, or 0 if they overlap.
 fn gap(a: &(Parts, Motion), b: &(Parts, Motion), s: f64) -> f64 {
     let from = a.1.from.translation.vector;
     let (one, other) = (placed(&a.0, &a.1, s, &from), placed(&b.0, &b.1, s, &from));

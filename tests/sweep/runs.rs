@@ -1,5 +1,5 @@
-//! Balls that go on for hundreds of ticks, many of which are short of work: no touch on the way goes untold, whatever was
-//! certified, left open or told before.
+//! Balls that move for hundreds of ticks, many of which have too little budget: every contact during a motion is
+//! published, whatever was certified, left open or published before.
 
 use sweepd::math::{Pose, Vec3};
 use sweepd::time::Budget;
@@ -11,10 +11,10 @@ use crate::rig::{ALL, Rig, body, scene};
 const BALLS: usize = 10;
 const RADIUS: f64 = 0.5;
 const TICKS: usize = if cfg!(debug_assertions) { 600 } else { 6_000 };
-/// Touches by less than this may be told either way, metres.
+/// Contacts with less overlap than this may have either result, metres.
 const SLACK: f64 = 1e-9;
 
-/// The least distance of two centres that go straight for the same while.
+/// The least distance of two centres that move in straight lines during the same time.
 fn least(from: [Vec3; 2], to: [Vec3; 2]) -> f64 {
     let (start, way) = (from[1] - from[0], (to[1] - to[0]) - (from[1] - from[0]));
     let square = way.norm_squared();
@@ -26,7 +26,7 @@ fn least(from: [Vec3; 2], to: [Vec3; 2]) -> f64 {
     (start + way * share).norm()
 }
 
-/// What a tick told of a pair.
+/// The flags and the verdict of a pair in a tick.
 fn flags_and_verdict(rig: &Rig, a: u64, b: u64) -> (u8, Verdict) {
     let row = rig.pair(a, b).map_or(0, |row| row.flags);
     (row, rig.verdict(a, b))
@@ -50,7 +50,7 @@ fn in_a_long_run_short_of_work_every_touch_on_the_way_is_told() {
     for tick in 0..TICKS {
         let before = centres.clone();
         for (at, centre) in centres.iter_mut().enumerate() {
-            // Some rest, most go a little way, few jump to where another one was.
+            // Some rest, most move a little, few jump to where another ball was.
             match rng.below(8) {
                 0 | 1 => {}
                 2 => *centre = before[(at + 1 + rng.below(BALLS - 1)) % BALLS],
@@ -78,7 +78,7 @@ fn in_a_long_run_short_of_work_every_touch_on_the_way_is_told() {
                 if tick == 0 || a % 3 == 0 && b % 3 == 0 {
                     continue;
                 }
-                // Who is not continuous is at its new place all the way.
+                // A ball that is not continuous is at its new position for the whole tick.
                 let from = [a, b].map(|at| if at % 3 == 0 { centres[at] } else { before[at] });
                 let distance = least(from, [centres[a], centres[b]]) - 2.0 * RADIUS;
                 let hit = told & pair_flags::SWEPT_HIT != 0;

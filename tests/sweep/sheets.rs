@@ -1,7 +1,7 @@
-//! Walls without any thickness: a sheet of two triangles, and a closed plate whose two sides are in the same place.
+//! Walls of zero thickness: a sheet of two triangles, and a closed plate whose two sides coincide.
 //!
-//! Method: as walls of a millimetre in `cases` and `walls`: flights whose touch is known by hand, from either side, and
-//! random shots whose touch is found by bisection.
+//! Method: as for walls of a millimetre in `cases` and `walls`: flights with contacts computed by hand, from either
+//! side, and random shots with contacts found by bisection.
 
 use sweepd::math::{Point, Pose, Quat, Vec3};
 use sweepd::wire::{Event, State, Verdict};
@@ -11,7 +11,7 @@ use crate::oracle::meshes::{Soup, cuboid, trimesh};
 use crate::rig::{ALL, Rig, body, has, scene};
 use crate::walls::{COUNT, HALF, bullets, shoot, world_of};
 
-/// The time of impact is promised to be as near as this, as a share of the motion.
+/// Promised width of the interval of the time of impact, as a share of the motion.
 const CLOSE: f64 = 1e-6;
 
 /// A rectangle in the plane z = 0, as two triangles.
@@ -22,12 +22,12 @@ fn sheet() -> Soup {
     Soup::new(vertices, vec![[0, 1, 2], [0, 2, 3]])
 }
 
-/// The walls as text. The plate has each face twice, the second time turned round: a solid, with nothing in it.
+/// The walls as text. The plate has each face twice, once inverted: a solid with an empty inside.
 fn walls() -> [(&'static str, String); 2] {
     let plate = sheet().and(sheet().inverted());
     [
         ("sheet", trimesh(&sheet(), Some(false))),
-        // That it is a solid is refused of what is not closed.
+        // A mesh that is not closed would be refused as a solid.
         ("plate", trimesh(&plate, Some(true))),
     ]
 }
@@ -42,7 +42,7 @@ fn a_ball_or_a_box_through_a_wall_of_no_thickness_is_a_hit_from_either_side() {
         Quat::identity(),
         Quat::from_scaled_axis(Vec3::new(0.3, 0.5, 0.2)),
     );
-    // How far a box reaches along z.
+    // The extent of a box along z.
     let reach = |turn: Quat| half.dot(&(turn.inverse() * Vec3::z()).abs());
     let shots = [
         (SHOT, flat, 0.01),
@@ -51,7 +51,7 @@ fn a_ball_or_a_box_through_a_wall_of_no_thickness_is_a_hit_from_either_side() {
         (mesh.as_str(), flat, reach(flat)),
         (mesh.as_str(), turned, reach(turned)),
     ];
-    // Straight through a face, straight through the edge between two, and aslant.
+    // Straight through a face, straight through the edge between two faces, and at an angle.
     let ways = [
         [[0.3, 0.2], [0.3, 0.2]],
         [[0.0, 0.0], [0.0, 0.0]],
@@ -94,7 +94,7 @@ fn a_ball_or_a_box_through_a_wall_of_no_thickness_is_a_hit_from_either_side() {
 
 #[test]
 fn a_bullet_through_a_wall_of_no_thickness_is_never_missed_and_its_time_is_right() {
-    // Balls and boxes: the first two kinds.
+    // Only balls and boxes: the first two kinds.
     for (kind, bullet) in bullets().iter().take(2).enumerate() {
         for (name, wall) in walls() {
             let (mut rig, seed) = (world_of(&wall, bullet), 60 + kind as u64);
@@ -116,7 +116,7 @@ fn what_stops_before_a_wall_of_no_thickness_or_passes_its_rim_is_no_hit() {
             ],
         ));
         let beside = HALF.x + 0.01;
-        // The ball's radius is 10 mm: it ends a hair above the wall, or goes by a millimetre beside it.
+        // The radius of the ball is 10 mm: it stops just above the wall, or passes it by a millimetre.
         for (x, z, is_hit) in [
             (0.3, 0.01 + 1e-7, false),
             (0.3, 0.01 - 1e-7, true),

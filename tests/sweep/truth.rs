@@ -1,19 +1,19 @@
-//! The motion by Rodrigues' formula, and the first touch with a wall by sampling and bisection: none of it is the
-//! library's.
+//! The motion by Rodrigues' formula, and the first contact with a wall by sampling and bisection, without any code of
+//! the library.
 
 use sweepd::math::{Point, Pose, Vec3};
 
-/// A motion: the centre straight, a turn about an axis at a constant rate.
+/// A motion: a translation of the centre along a line, and a rotation about an axis at a constant rate.
 pub struct Motion {
     pub from: Pose,
     pub travel: Vec3,
-    /// Unit.
+    /// Unit vector.
     pub axis: Vec3,
     pub angle: f64,
 }
 
 impl Motion {
-    /// Where a point of the body is at share `s`.
+    /// Position of a point of the body at share `s` of the motion.
     pub fn place(&self, p: &Vec3, s: f64) -> Vec3 {
         let arm = self.from.rotation * p;
         let (sin, cos) = (self.angle * s).sin_cos();
@@ -23,7 +23,7 @@ impl Motion {
         self.from.translation.vector + self.travel * s + turned
     }
 
-    /// The last pose.
+    /// The final pose.
     pub fn end(&self) -> Pose {
         let turn = sweepd::math::Quat::from_scaled_axis(self.axis * self.angle);
         Pose::from_parts(
@@ -33,14 +33,14 @@ impl Motion {
     }
 }
 
-/// A plate: a box much wider than the body, so that its face is what is met.
+/// A plate: a box much wider than the body, so that the contact is with its face.
 pub struct Plate {
     pub pose: Pose,
     pub half: Vec3,
 }
 
 impl Plate {
-    /// Least signed height of some points rolled round by `margin` above the plate's upper or lower face, whichever the
+    /// Least signed height of points with radius `margin` above the upper or lower face of the plate, whichever the
     /// motion comes from.
     fn height(&self, points: &[Vec3], margin: f64, motion: &Motion, s: f64, side: f64) -> f64 {
         let up = self.pose.rotation * Vec3::z() * side;
@@ -52,10 +52,9 @@ impl Plate {
             - self.half.z
     }
 
-    /// The share at which a body first touches the plate's face, for a body that is before it at first and goes
-    /// through.
+    /// The share at which a body first touches the plate's face; the body starts in front of it and passes through.
     ///
-    /// * `around` - a share at which it is in the plate, and how much before it it cannot have been there yet.
+    /// * `around` - a share at which it is in the plate, and a range before it that begins without contact.
     pub fn first_touch(
         &self,
         points: &[Vec3],

@@ -1,4 +1,4 @@
-//! Spheres, boxes, needles and meshes through walls of 1 mm, up to 100 m a tick, spinning.
+//! Spheres, boxes, needles and meshes through walls of 1 mm, up to 100 m per tick, spinning.
 
 use std::f64::consts::PI;
 
@@ -11,8 +11,8 @@ use crate::oracle::rng::Rng;
 use crate::rig::{ALL, Rig, body, has, scene};
 use crate::truth::{Motion, Plate, point_box};
 
-/// What flies: its shape as text, the points it is the hull of (a mesh: its corners), the ball rolled round them, its
-/// radius.
+/// A projectile: its shape as text, the points whose hull it is (for a mesh: its vertices), the radius of the ball
+/// swept over them, and its bounding radius.
 pub struct Bullet {
     pub shape: String,
     pub points: Vec<Vec3>,
@@ -69,7 +69,7 @@ pub fn world(bullet: &Bullet) -> Rig {
     world_of(&wall, bullet)
 }
 
-/// A wall as text, and a bullet.
+/// A wall, given as text, and a bullet.
 pub fn world_of(wall: &str, bullet: &Bullet) -> Rig {
     let mut rig = Rig::new(&scene(
         "",
@@ -82,7 +82,7 @@ pub fn world_of(wall: &str, bullet: &Bullet) -> Rig {
     rig
 }
 
-/// A wall and a motion through it: the centre is in the wall at the share told.
+/// A wall and a motion through it: the centre is in the wall at the returned share.
 pub fn shot(rng: &mut Rng, far: f64) -> (Plate, Motion, f64) {
     let wall = Pose::from_parts(rng.vector(far).into(), rng.rotation());
     let plate = Plate {
@@ -110,7 +110,7 @@ pub fn shot(rng: &mut Rng, far: f64) -> (Plate, Motion, f64) {
     (plate, motion, share)
 }
 
-/// Places both, and lets the bullet go: two ticks.
+/// Places both and moves the bullet: two ticks.
 pub fn fly(rig: &mut Rig, plate: &Plate, motion: &Motion, budget: Budget) {
     rig.epoch += 1;
     rig.place(1, &plate.pose);
@@ -120,11 +120,11 @@ pub fn fly(rig: &mut Rig, plate: &Plate, motion: &Motion, budget: Budget) {
     rig.send(budget);
 }
 
-/// Random shots of a bullet through a wall about the place of body 1, each of which is to be a hit at the right time;
-/// yields the worst error of the times.
+/// Shoots a bullet through a wall, placed as body 1, in random ways; each shot must be a hit at the right time. Returns
+/// the greatest error of the times.
 ///
-/// * `half_z` - half of the wall's thickness, metres: `HALF.z`, or nothing.
-/// * `seed` - and how many shots, and how far from the origin, metres.
+/// * `half_z` - half of the wall's thickness, metres: `HALF.z`, or 0.
+/// * `seed` - with the number of shots and the distance from the origin, metres.
 pub fn shoot(
     rig: &mut Rig,
     bullet: &Bullet,
@@ -139,7 +139,7 @@ pub fn shoot(
         plate.half.z = half_z;
         let speed = (plate.pose.rotation * Vec3::z()).dot(&motion.travel).abs();
         let ahead = 1.01 * (bullet.radius + 2.0 * HALF.z) / speed;
-        // Both ends plainly apart.
+        // Both ends must be clearly apart.
         if ahead > share || ahead > 1.0 - share {
             continue;
         }
@@ -154,7 +154,7 @@ pub fn shoot(
         for event in [Event::Begin, Event::End, Event::Passed] {
             assert!(has(row, event), "{what} {row:?}");
         }
-        // Where the coordinates end, so does the time.
+        // The resolution of the coordinates limits that of the time.
         let allowed = 1e-11 + 1e-14 * far / speed;
         let error = (row.toi_min - truth).abs().max((row.toi_max - truth).abs());
         assert!(
@@ -203,7 +203,7 @@ fn what_stays_before_the_wall_or_beside_it_is_no_hit() {
         for case in 0..COUNT / 2 {
             let (plate, mut motion, share) = shot(&mut rng, 10.0);
             if case % 2 == 0 {
-                // It stops or starts just before the wall.
+                // It stops just before the wall, or starts just before it.
                 let up = plate.pose.rotation * Vec3::z();
                 let speed = up.dot(&motion.travel).abs();
                 let clear = (bullet.radius + HALF.z) * rng.range(1.0001, 1.1) / speed;
@@ -254,7 +254,7 @@ fn a_bullet_at_rest_is_not_swept() {
 
 #[test]
 fn bug_a_touch_within_rounding_was_told_before_it_was() {
-    // A ball of 1 mm flies 10 mm at a wall of 1 mm: its surface meets the wall's after 3 mm.
+    // A ball of radius 1 mm moves 10 mm towards a wall of 1 mm: their surfaces meet after 3 mm.
     let mut rig = Rig::new(&scene(
         "",
         &[

@@ -1,5 +1,5 @@
-//! A stand-in daemon for transport tests: takes frames, answers each with a tick that names it, echoes requests.
-//! It knows nothing of geometry, so that what these tests find is the transport's.
+//! A stand-in daemon for transport tests: it receives frames, answers each with a tick that names it, and echoes
+//! requests. It has no geometry, so a failure of these tests is one of the transport.
 #![allow(
     dead_code,
     clippy::unwrap_used,
@@ -32,7 +32,7 @@ pub const SECOND_NS: u64 = 1_000_000_000;
 
 static PLACES: AtomicU64 = AtomicU64::new(0);
 
-/// A place of its own for each test: root, prefix and instance; removed by `Files` when the test ends.
+/// A separate place for each test: root, prefix and instance; deleted on drop.
 #[derive(Debug)]
 pub struct Files {
     pub place: Place,
@@ -53,8 +53,8 @@ impl Files {
         }
     }
 
-    /// Files of this place in shared memory and under the root, without iceoryx2's one file for ever and bare
-    /// directories.
+    /// Files of this place in shared memory and under the root, except for directories and the one management file that
+    /// iceoryx2 keeps for ever.
     pub fn left(&self) -> Vec<String> {
         let mut left = Vec::new();
         for entry in std::fs::read_dir("/dev/shm").unwrap().flatten() {
@@ -95,7 +95,7 @@ impl Drop for Files {
     }
 }
 
-/// What the stand-in heard.
+/// The messages that the stand-in received.
 #[derive(Clone, Debug, Default)]
 pub struct Log {
     pub frames: Vec<(FrameHeader, usize, Option<RejectReason>, bool)>,
@@ -104,14 +104,14 @@ pub struct Log {
     pub requests: Vec<Vec<u8>>,
 }
 
-/// How the stand-in behaves.
+/// The behaviour of the stand-in.
 #[derive(Clone, Copy, Debug)]
 pub struct Manners {
     pub boot_id: u64,
-    /// Before its first tick it sleeps so long.
+    /// It sleeps for this time before its first tick.
     pub nap: Duration,
     pub heartbeat_ns: u64,
-    /// Each tick with frames is told of, alone, before it is there.
+    /// Whether each tick with frames is announced by ticks without lists before its result, as a slow tick is.
     pub long_ticks: bool,
 }
 
@@ -135,7 +135,7 @@ pub struct StandIn {
 }
 
 impl StandIn {
-    /// Starts it on a thread of its own; comes back when the door is open.
+    /// Starts it on its own thread; returns when its door is open.
     pub fn start<D: Door>(
         manners: Manners,
         open: impl FnOnce() -> Result<D> + Send + 'static,
@@ -288,7 +288,7 @@ fn admit(tick: &mut TickRow, frame: &Frame) {
     tick.sources_len = tick.sources_len.max(u8::try_from(at + 1).unwrap());
 }
 
-/// The next tick is under way: a tick alone, as a daemon sends it each heartbeat.
+/// Announces a tick that is under way: the tick alone, as a daemon sends it at each heartbeat.
 fn tell_of(door: &mut dyn Door, last: &TickRow) {
     let mut bare = TickRow {
         header: last.header,
@@ -315,7 +315,7 @@ fn tick(door: &mut dyn Door, outbox: &mut Outbox, demand: sweepd::wire::Demand, 
     outbox.regions_header = header;
     outbox.contacts.clear();
     outbox.regions.clear();
-    // one colliding pair for each body: enough to tell frames apart
+    // one colliding pair per body, enough to tell frames apart
     let pair = |row: &TransformRow| PairRow {
         body_a: row.body,
         body_b: row.body + 1,
@@ -373,9 +373,9 @@ fn tick(door: &mut dyn Door, outbox: &mut Outbox, demand: sweepd::wire::Demand, 
     outbox.plan_changed = false;
 }
 
-/// What is new of a list: all rows that are there, and those of the tick before that are not.
+/// Updates a list of changes: all present rows, and the rows of the tick before that are gone.
 ///
-/// * `left` - the row that says that a pair has left the list.
+/// * `left` - makes the row that reports that a pair has left the list.
 fn retell<R: Copy + PartialEq>(
     tick: MessageHeader,
     anew: bool,
@@ -399,7 +399,7 @@ fn retell<R: Copy + PartialEq>(
     rows.extend_from_slice(now);
 }
 
-/// `n` bodies whose x says which frame they are from.
+/// `n` bodies whose x identifies the frame that they are from.
 pub fn poses(n: u64, x: f64) -> Vec<TransformRow> {
     (1..=n)
         .map(|body| TransformRow {
@@ -411,7 +411,7 @@ pub fn poses(n: u64, x: f64) -> Vec<TransformRow> {
         .collect()
 }
 
-/// Waits until a check holds; ten seconds at most.
+/// Waits until a condition holds, at most ten seconds.
 pub fn until(what: &str, mut holds: impl FnMut() -> bool) {
     let clock = SystemClock;
     let end_ns = clock.monotonic_ns() + 10 * SECOND_NS;

@@ -1,14 +1,14 @@
-//! Bullet 3: its two trees (`btDbvtBroadphase`, margin 0.05, pairs kept) and its sweep over three axes in 32 bits.
+//! Bullet 3: its pair of trees (`btDbvtBroadphase`, margin 0.05, pairs cached) and its three-axis sweep in 32 bits.
 //!
-//! What is timed: removal and insertion of the churned, `setAabb` of the moved, `calculateOverlappingPairs`. Its pair
-//! cache is up to date then.
+//! Timed: removal and insertion of churned bodies, `setAabb` of moved ones, `calculateOverlappingPairs`. After that its
+//! pair cache is current.
 
 use crate::exact::Pair;
 use crate::methods::{Runner, timed};
 use crate::rust::real;
 use crate::scenes::{Box3, Scene};
 
-/// Insertion one by one into long sorted lists: above this number it takes longer than a run may.
+/// Above this number of bodies, insertion one by one into long sorted lists takes longer than the time limit of a run.
 pub const SWEEP_BODIES_MAX: usize = 20_000;
 
 #[repr(C)]
@@ -16,7 +16,7 @@ struct Broad {
     _private: [u8; 0],
 }
 
-// In `bullet.cpp`. A `Box3` is six floats, the lower corner first, as its `Box`.
+// Defined in `bullet.cpp`. A `Box3` has the layout of its `Box`: six floats, lower corner first.
 unsafe extern "C" {
     fn bullet_new(sweep: bool, bodies: u32, world: *const Box3) -> *mut Broad;
     fn bullet_put(broad: *mut Broad, boxes: *const Box3, bodies: *const u32, count: usize);
@@ -32,12 +32,12 @@ unsafe extern "C" {
     fn bullet_pairs(broad: *mut Broad, pairs: *mut [u32; 2]);
 }
 
-/// Lives as long as the process, which makes only one.
+/// Never freed: each process makes only one.
 pub struct Bullet(*mut Broad);
 
 impl Bullet {
     pub fn new(sweep: bool, scene: &Scene) -> Self {
-        // Twice the extent of the beginning: what goes beyond is cut to the edge, and loses no pair.
+        // Twice the initial extent; boxes beyond it are clamped to its edge, which loses no pair.
         let mut world = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
         for b in &scene.boxes {
             for k in 0..3 {
@@ -51,7 +51,7 @@ impl Bullet {
             *low -= more;
             *high += more;
         }
-        // SAFETY: `world` is read during the call only.
+        // SAFETY: `bullet_new` reads `world` only during the call.
         Self(unsafe { bullet_new(sweep, scene.boxes.len() as u32, &world) })
     }
 }
@@ -65,8 +65,9 @@ impl Runner for Bullet {
         };
         let (boxes, churned, moved) = (scene.boxes.as_ptr(), &scene.churned, &scene.moved);
         timed(|| {
-            // SAFETY: `self.0` comes from `bullet_new` and is freed nowhere; every body is below the number of boxes,
-            // for which it made room; a body is put once before it is stepped; nothing is kept of the slices.
+            // SAFETY: `self.0` comes from `bullet_new` and is never freed; every body index is below the number of
+            // boxes, for which `bullet_new` reserved memory; each body is put before it is stepped; Bullet keeps no
+            // pointer into the slices.
             unsafe {
                 bullet_put(self.0, boxes, all.as_ptr(), all.len());
                 bullet_step(
@@ -82,7 +83,7 @@ impl Runner for Bullet {
     }
 
     fn pairs(&self, scene: &Scene) -> Vec<Pair> {
-        // SAFETY: as above; `found` has room for as many pairs as are told.
+        // SAFETY: as above; `found` has room for `bullet_pair_count` pairs.
         let found = unsafe {
             let mut found = vec![[0; 2]; bullet_pair_count(self.0)];
             bullet_pairs(self.0, found.as_mut_ptr());

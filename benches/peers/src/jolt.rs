@@ -1,12 +1,12 @@
-//! Jolt 5: its lock-free tree of four children, as joltc-sys builds it (profiler and debug renderer compiled in).
+//! Jolt 5: its lock-free quad tree, as joltc-sys builds it (profiler and debug renderer compiled in).
 //!
-//! What is timed: removal and insertion of the churned, `NotifyBodiesAABBChanged` of the moved, the rebuilding of what
-//! changed (Jolt would do it in the background), `FindCollidingPairs`. Boxes and who is active are set before.
+//! Timed: removal and insertion of churned bodies, `NotifyBodiesAABBChanged` of moved ones, rebuilding of changed parts
+//! (which Jolt would do in the background), `FindCollidingPairs`. Boxes and the list of active bodies are set before.
 //!
-//! It keeps no pairs. `jolt` asks for those of every body, `jolt-active`, as Jolt's own step does, for those of what
-//! moved: the rest stay untold.
+//! Jolt keeps no pairs. `jolt` queries the pairs of every body; `jolt-active` queries those of moved bodies only, as
+//! Jolt's own step does, and reports no others.
 
-// Brings Jolt itself, called through `jolt.cpp`.
+// Links Jolt itself, which `jolt.cpp` calls.
 use joltc_sys as _;
 
 use crate::exact::Pair;
@@ -19,7 +19,7 @@ struct Broad {
     _private: [u8; 0],
 }
 
-// In `jolt.cpp`. A `Box3` is six floats, the lower corner first, as its `Box`.
+// Defined in `jolt.cpp`. A `Box3` has the layout of its `Box`: six floats, lower corner first.
 unsafe extern "C" {
     fn jolt_new(bodies: u32) -> *mut Broad;
     fn jolt_take(
@@ -36,7 +36,7 @@ unsafe extern "C" {
     fn jolt_pairs(broad: *mut Broad, count: *mut usize) -> *const [u32; 2];
 }
 
-/// Lives as long as the process, which makes only one.
+/// Never freed: each process makes only one.
 pub struct Jolt {
     broad: *mut Broad,
     everybody: bool,
@@ -44,7 +44,7 @@ pub struct Jolt {
 
 impl Jolt {
     pub fn new(everybody: bool, scene: &Scene) -> Self {
-        // SAFETY: called once, before anything else of Jolt.
+        // SAFETY: called once, before any other call to Jolt.
         let broad = unsafe { jolt_new(scene.boxes.len() as u32) };
         assert!(
             !broad.is_null(),
@@ -62,8 +62,8 @@ impl Runner for Jolt {
         } else {
             (&scene.churned[..], &scene.moved[..])
         };
-        // SAFETY: `broad` comes from `jolt_new`, which made as many bodies as there are boxes; nothing is kept of the
-        // slices.
+        // SAFETY: `broad` comes from `jolt_new`, which made as many bodies as there are boxes; Jolt keeps no pointer
+        // into the slices.
         unsafe {
             jolt_take(
                 self.broad,
@@ -76,7 +76,7 @@ impl Runner for Jolt {
             );
         }
         timed(|| {
-            // SAFETY: every body has its box by now, and is put in before the first step.
+            // SAFETY: every body has a box by now, and is inserted before the first step.
             unsafe {
                 if first {
                     jolt_insert(self.broad);
@@ -88,7 +88,8 @@ impl Runner for Jolt {
 
     fn pairs(&self, scene: &Scene) -> Vec<Pair> {
         let mut count = 0;
-        // SAFETY: the numbers stay where they are until the next step; two make a pair. None may be at null.
+        // SAFETY: the array stays valid until the next step; two numbers make a pair. Its pointer may be null if there
+        // are no pairs, so the slice is not made from it then.
         let found = unsafe {
             let pairs = jolt_pairs(self.broad, &mut count);
             match count / 2 {

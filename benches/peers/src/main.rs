@@ -1,7 +1,7 @@
-//! Ours beside the peers, on the same boxes, one process a run.
+//! Our broad phases and those of other libraries on the same boxes, one process per run.
 //!
 //! `cargo run --release -- [--bodies 1000,10000,100000] [--scene gas,pile] [--method order,parry] [--frames N]
-//! [--save]` in this folder; what it prints: see `benches/broad/run.rs`. With the feature `cpp` beside peers in C++ too.
+//! [--save]` in this folder; for the output see `benches/broad/run.rs`. The feature `cpp` adds the C++ libraries.
 
 #[cfg(feature = "cpp")]
 mod bullet;

@@ -1,7 +1,7 @@
-//! PhysX 5: its automatic box pruning (`PxBroadPhaseType::eABP`), stand-alone, on one thread.
+//! PhysX 5: its automatic box pruning (`PxBroadPhaseType::eABP`), standalone, on one thread.
 //!
-//! What is timed: `update` and `fetchResults`, which tell pairs found and lost. It keeps no list of pairs for its
-//! caller; that is done here as for rapier: untimed, but in the memory that is told.
+//! Timed: `update` and `fetchResults`, which report new and lost pairs. PhysX keeps no list of pairs for its caller;
+//! this file keeps one as for rapier, which is not timed but counts towards the reported memory.
 
 use std::collections::BTreeSet;
 
@@ -12,17 +12,17 @@ use crate::methods::{Runner, timed};
 use crate::rust::real;
 use crate::scenes::{Kind, Scene};
 
-/// Lives as long as the process, which makes only one.
+/// Never freed: each process makes only one.
 pub struct PhysX {
     broad: *mut px::PxBroadPhase,
     bounds: Vec<px::PxBounds3>,
     groups: Vec<u32>,
     distances: Vec<f32>,
     bodies: u32,
-    /// The handle of each body: its number, or that and `bodies`. One that is removed cannot be created in the same
-    /// update, so a churned body goes to its other one.
+    /// The handle of each body: its index, or its index plus `bodies`. A handle that is removed cannot be created again
+    /// in the same update, so a churned body switches between its two handles.
     handles: Vec<u32>,
-    /// By handle.
+    /// Current pairs, by handle.
     found: BTreeSet<Pair>,
 }
 
@@ -34,7 +34,8 @@ impl PhysX {
         } else {
             bodies
         };
-        // SAFETY: none of these keeps what it is given; the foundation, made before what needs it, is never released.
+        // SAFETY: none of these calls keeps its arguments; the foundation is made before everything that needs it, and
+        // is never released.
         let (broad, groups) = unsafe {
             assert!(!px::physx_create_foundation().is_null());
             let desc = px::PxBroadPhaseDesc_new(px::PxBroadPhaseType::Abp);
@@ -54,7 +55,7 @@ impl PhysX {
         };
         Self {
             broad,
-            // One more than are used: it loads four bytes past the last.
+            // One more than there are handles: PhysX loads four bytes past the last box.
             bounds: vec![none; handles + 1],
             groups,
             distances: vec![0.0; handles],
@@ -91,15 +92,15 @@ impl Runner for PhysX {
         }
         let moved = scene.moved.iter();
         let mut updated: Vec<u32> = moved.map(|body| self.take(*body, scene)).collect();
-        // It wants its lists sorted, and misses pairs otherwise.
+        // PhysX requires sorted lists; it misses pairs otherwise.
         for list in [&mut created, &mut removed, &mut updated] {
             list.sort_unstable();
         }
         let mut found: &[px::PxBroadPhasePair] = &[];
         let mut lost: &[px::PxBroadPhasePair] = &[];
         let ns = timed(|| {
-            // SAFETY: the lists are as long as said and below the capacity, and what they point to outlives the
-            // update; the results stay until the next one.
+            // SAFETY: the lists have the given lengths, below the capacity, and their memory outlives the update; the
+            // results stay valid until the next update.
             unsafe {
                 let update = px::PxBroadPhaseUpdateData_new(
                     created.as_ptr(),
@@ -115,7 +116,7 @@ impl Runner for PhysX {
                 );
                 let mut results = px::PxBroadPhaseResults_new();
                 px::PxBroadPhase_update_mut_1(self.broad, &mut results, &update);
-                // No pairs may be told with a null pointer, which no slice has.
+                // With no pairs the pointer may be null, of which no slice may be made.
                 if results.mNbCreatedPairs > 0 {
                     let count = results.mNbCreatedPairs as usize;
                     found = std::slice::from_raw_parts(results.mCreatedPairs, count);
@@ -131,7 +132,7 @@ impl Runner for PhysX {
         for pair in lost {
             self.found.remove(&key(pair));
         }
-        // The pairs of what was removed are not told.
+        // PhysX does not report the lost pairs of removed handles.
         if !removed.is_empty() {
             let gone = |handle: &u32| removed.binary_search(handle).is_ok();
             self.found.retain(|(a, b)| !gone(a) && !gone(b));

@@ -1,6 +1,6 @@
-//! The peers in Rust, in f32 as they are mostly used.
+//! The peers in Rust, in f32, their usual precision.
 //!
-//! What is timed: parry, leaves, refit, optimiser, self-traversal and all pairs written; rapier, `set_aabb` of the
+//! Timed: for parry, updating leaves, refit, optimizer, self-traversal and writing all pairs; for rapier, `set_aabb` of
 //! moved boxes and `update` with its events. Filling the peers' own objects is not timed.
 
 use parry3d::bounding_volume::Aabb as PeerBox;
@@ -20,7 +20,7 @@ fn peer_box(b: &Box3) -> PeerBox {
     }
 }
 
-/// Of a peer's pairs those whose boxes overlap, sorted.
+/// The pairs of a peer whose boxes really overlap, sorted.
 pub fn real(scene: &Scene, pairs: impl Iterator<Item = Pair>) -> Vec<Pair> {
     let mut all: Vec<Pair> = pairs
         .map(|(a, b)| (a.min(b), a.max(b)))
@@ -30,7 +30,7 @@ pub fn real(scene: &Scene, pairs: impl Iterator<Item = Pair>) -> Vec<Pair> {
     all
 }
 
-/// parry3d's tree, bare.
+/// The tree of parry3d alone.
 #[derive(Default)]
 pub struct Parry {
     tree: Bvh,
@@ -104,7 +104,7 @@ impl Runner for Rapier {
         let all: Vec<u32> = if first {
             (0..scene.boxes.len() as u32).collect()
         } else {
-            // A body put in elsewhere is one that moved: to give and drop handles is not the broad phase's work.
+            // A churned body is treated as moved: creating and dropping handles is not the work of the broad phase.
             scene.churned.iter().chain(&scene.moved).copied().collect()
         };
         let boxes: Vec<PeerBox> = all

@@ -1,4 +1,4 @@
-//! What hangs on another goes that one's way, and how fast its gaps shrink follows from it: circles and lines.
+//! Attached bodies move with their root, and so does the closing speed of their gaps: circles and lines.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -12,7 +12,7 @@ use crate::rig::{ALL, Rig, scene};
 
 const HUB: &str = "name = \"hub\"\nid = 1\nshape = { type = \"sphere\", radius = 0.1 }\n";
 
-/// A ball of radius 0.1 m at a place; seen from the body it hangs on, if it hangs on one.
+/// A ball of radius 0.1 m at a position in the scene, or in the frame of the body that it is attached to.
 fn small(name: &str, place: [f64; 3], more: &str) -> String {
     format!(
         "name = \"{name}\"\nposition = {place:?}\nshape = {{ type = \"sphere\", radius = 0.1 }}\n{more}\n"
@@ -27,7 +27,7 @@ fn post(name: &str, place: [f64; 3]) -> String {
     small(name, place, "moves = false")
 }
 
-/// A hub, a hand 1 m beside it, a tip 1 m beside that, and posts.
+/// A hub, a hand attached 1 m from it, a tip attached 1 m from the hand, and posts.
 fn arm(velocity: [f64; 6], posts: &[String]) -> Rig {
     let mut bodies = vec![
         HUB.to_owned(),
@@ -41,7 +41,7 @@ fn arm(velocity: [f64; 6], posts: &[String]) -> Rig {
     rig
 }
 
-/// It was taken to be at rest, and proved apart from what it was about to meet.
+/// It was treated as being at rest, and proved apart from the body it was about to hit.
 #[test]
 fn bug_what_hangs_on_a_body_that_moves_goes_with_it() {
     let posts = [
@@ -82,16 +82,16 @@ fn bug_what_hangs_on_a_body_that_turns_goes_on_an_arc() {
     at(&hand, 1.0 - 2.0 * 0.1_f64.asin() / FRAC_PI_2);
     assert!((hand.linear_a[1] - FRAC_PI_2).abs() < 1e-12, "{hand:?}");
     assert_eq!(hand.angular_a, [0.0, 0.0, FRAC_PI_2]);
-    // The circle of the hand passes it by 0.6 m; a straight way would meet it.
+    // The hand passes it on its circle at 0.6 m; a straight motion would hit it.
     let past = ask(world, r#"{"a": "hand", "b": "beside", "within_s": 3}"#);
     assert_eq!(past.verdict, Verdict::Apart.code(), "{past:?}");
-    // Three eighths of a turn away, and a chain of two.
+    // Three eighths of a turn away, over a chain of two attachments.
     let two = 2.0 * (0.1 / 2.0_f64.sqrt()).asin();
     at(
         &ask(world, r#"{"a": "tip", "b": "far", "within_s": 3}"#),
         (1.5 * FRAC_PI_2 - two) / FRAC_PI_2,
     );
-    // A root whose middle is elsewhere goes straight by its middle, and turns about it.
+    // A root whose centre is not its origin moves in a straight line with its centre, and turns about it.
     let hub = "name = \"hub\"\nid = 1\nshape = { type = \"sphere\", radius = 0.1, position = [0, 1, 0] }\n";
     let mut rig = Rig::new(&scene(
         "",
@@ -101,7 +101,7 @@ fn bug_what_hangs_on_a_body_that_turns_goes_on_an_arc() {
             post("post", [0.0, 2.0, 0.0]),
         ],
     ));
-    // The middle of the hub stands still.
+    // The centre of the hub does not move.
     rig.velocities = vec![[FRAC_PI_2, 0.0, 0.0, 0.0, 0.0, FRAC_PI_2]];
     rig.send(ALL);
     at(
@@ -118,10 +118,10 @@ fn what_a_question_says_of_a_body_moves_it_and_what_hangs_on_it() {
     let posts = [post("post", [3.0, 0.0, 0.0])];
     let still = arm([0.0; 6], &posts);
     let world = still.engine.world();
-    // Of its own: straight by its own middle.
+    // A velocity of its own moves its own centre in a straight line.
     let own = r#"{"a": "hand", "b": "post", "linear_a": [1, 0, 0], "angular_a": [0, 0, 5], "within_s": 5}"#;
     at(&ask(world, own), 1.8);
-    // One that hangs on the other goes with it, over chains too; the other does not go with what hangs on it.
+    // A body attached to the other moves with it, also over chains; the other does not move with its attached body.
     for json in [
         r#"{"a": "hub", "b": "tip", "linear_a": [1, 2, 0], "angular_a": [0, 50, 5], "within_s": 50}"#,
         r#"{"a": "tip", "b": "hub", "linear_b": [1, 2, 0], "angular_b": [0, 50, 5], "within_s": 50}"#,
@@ -142,7 +142,7 @@ fn what_a_question_says_of_a_body_moves_it_and_what_hangs_on_it() {
         ),
         0.8,
     );
-    // Two that hang on one body, whatever it does, see each other at rest.
+    // Two bodies attached to the same root are at rest relative to each other, whatever the root does.
     let spins = arm([9.0, 0.0, 1.0, 30.0, 40.0, 50.0], &posts);
     let json = r#"{"a": "hand", "b": "tip", "within_s": 1000}"#;
     let found = ask(spins.engine.world(), json);
@@ -164,7 +164,7 @@ fn who_sends_no_velocity_is_named() {
         told[0].contains("\"hand\"") && told[0].contains("source of \"hub\""),
         "{told:?}"
     );
-    // Sent at the very same pose, it counts at once.
+    // A velocity sent with the same pose applies at once.
     silent.velocities = vec![[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]];
     silent.send(ALL);
     assert_eq!(warnings(silent.engine.world(), json), [""; 0]);
@@ -174,7 +174,7 @@ fn who_sends_no_velocity_is_named() {
     assert_eq!(warnings(silent.engine.world(), json).len(), 1);
 }
 
-/// It was told of the pose alone.
+/// Only the age of the pose was reported.
 #[test]
 fn bug_how_old_a_velocity_is_and_that_vertices_stay_is_told() {
     let sheet = "name = \"sheet\"\nposition = [0, 0, 9]\ndeforms = true\nshape = { type = \"trimesh\", solid = false, \
@@ -229,12 +229,12 @@ fn bug_how_old_a_velocity_is_and_that_vertices_stay_is_told() {
             "{told:?}"
         );
     }
-    // Its own word is news.
+    // A velocity given in the question replaces the stale one, so only one warning remains.
     let told = warnings(world, r#"{"a": "hub", "b": "post", "linear_a": [1, 0, 0]}"#);
     assert_eq!(told.len(), 1, "{told:?}");
 }
 
-/// Velocity of a body's middle by that of the root, over a chain of poses.
+/// Position and velocity of a body's origin, from the velocity of the root, over a chain of poses.
 fn middle(root: &Pose, chain: &[Pose], velocity: &[f64; 6]) -> (Point, Vec3) {
     let at = chain.iter().fold(*root, |at, local| at * local);
     let point = at * Point::origin();
@@ -246,7 +246,7 @@ fn middle(root: &Pose, chain: &[Pose], velocity: &[f64; 6]) -> (Point, Vec3) {
     )
 }
 
-/// It was told for no pair with a body that hangs on another.
+/// The speed was missing for every pair with an attached body.
 #[test]
 fn bug_how_fast_a_gap_shrinks_is_told_of_attached_bodies_too() {
     let near = "report_within_m = 100.0";
@@ -291,7 +291,7 @@ fn bug_how_fast_a_gap_shrinks_is_told_of_attached_bodies_too() {
                 rng.pose(rng_at(seed, step)),
                 rng.pose(rng_at(seed, step + 9)),
             );
-            // In the last step nothing but the velocities is new.
+            // In the last step only the velocities change.
             if step < 2 {
                 rig.place(1, &one);
                 rig.place(4, &other);
@@ -322,7 +322,7 @@ fn bug_how_fast_a_gap_shrinks_is_told_of_attached_bodies_too() {
                 );
             }
         }
-        // Who sends none has none, nor what hangs there.
+        // Without velocities neither the body nor those attached to it have one.
         rig.velocities.clear();
         rig.send(ALL);
         for a in [1, 2, 3] {

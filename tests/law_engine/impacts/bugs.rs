@@ -1,4 +1,4 @@
-//! Times of impact that were told wrong, too widely or not at all.
+//! Times of impact that were wrong, too wide or missing.
 
 use sweepd::math::Vec3;
 use sweepd::wire::Verdict;
@@ -7,7 +7,7 @@ use super::{SHAPES, ask, at, rig};
 use crate::oracle::rng::Rng;
 use crate::rig::{ALL, Rig, body, scene};
 
-/// It counted as a motion of its surface.
+/// The spin of a ball counted as motion of its surface.
 #[test]
 fn bug_a_ball_that_spins_touches_when_one_that_does_not_would() {
     for place in [[0.0; 3], [0.0, 0.3, -0.1]] {
@@ -17,7 +17,7 @@ fn bug_a_ball_that_spins_touches_when_one_that_does_not_would() {
             body(1, [0.0; 3], &ball, ""),
             body(2, [place[0] + 0.34, place[1], place[2]], post, ""),
         ]);
-        // Of the middle, whatever the turn.
+        // Velocity of the origin such that the centre of the ball moves along x at 0.1 m/s, whatever its spin.
         let spin = Vec3::new(0.0, 125.87, 3.0);
         let [x, y, z]: [f64; 3] = (Vec3::x() * 0.1 - spin.cross(&Vec3::from(place))).into();
         let json = format!(
@@ -54,7 +54,7 @@ shape = { type = "cylinder", radius = 0.2, half_height = 1 }"#,
     assert!(0.32 < low && high - low < 1e-6, "{found:?}");
 }
 
-/// Far out the gap is known so badly that its slope means nothing.
+/// Far from the origin the gap is known so inaccurately that its slope has no meaning.
 #[test]
 fn bug_what_goes_right_through_another_far_out_is_hit() {
     let bodies = [
@@ -76,7 +76,7 @@ shape = { type = "box", half_extents = [0.4552041465036235, 0.21622489485308055,
             "linear_a": [0.06487571380893808, -1.571133865889413, 3.6779518100721726]}"#,
     );
     assert_eq!(found.verdict, Verdict::Colliding.code(), "{found:?}");
-    // All meet head-on.
+    // All of these meet head-on.
     let (mut open, mut wide) = (0, 0.0_f64);
     for seed in 0..600 {
         let mut rng = Rng::new(seed);

@@ -1,4 +1,5 @@
-//! Rays at what may be elsewhere, is of no group, or was not looked at; and which of two that are met at once is told.
+//! Rays and bodies that may be elsewhere, are in no group, or were not tested; and the choice between two bodies met at
+//! once.
 
 use sweepd::math::Vec3;
 use sweepd::time::SystemClock;
@@ -7,7 +8,7 @@ use sweepd::wire::Verdict;
 use super::{ask, json, question};
 use crate::rig::{ALL, Rig, ball, body, scene};
 
-/// A ray from the side, along z through a place of the x axis.
+/// A ray along z through a position on the x axis.
 fn through(x: f64, more: &str) -> String {
     json(&Vec3::new(x, 0.0, -9.0), &Vec3::z(), more)
 }
@@ -36,7 +37,7 @@ fn bug_a_body_that_is_held_off_the_way_was_no_doubt() {
         .map(|it| (&*it.body, &*it.status))
         .collect();
     assert_eq!(named, [("b1", "held")]);
-    // Where it is held it is hit, and named, too.
+    // A held body is hit at its pose, and also listed as uncertain.
     let found = ask(rig.engine.world(), &through(0.0, ""));
     assert_eq!(found.body.as_deref(), Some("b1"));
     assert!(!found.complete && found.unknown.len() == 1, "{found:?}");

@@ -1,4 +1,4 @@
-//! Rays that are hard to tell: those that graze what they meet, and those that go as far as there may be anything.
+//! Rays that are hard to decide: those that graze a shape, and those of unlimited length.
 
 use sweepd::math::{Point, Pose, Vec3, pose_from};
 use sweepd::wire::{RayFound, Verdict};
@@ -30,7 +30,7 @@ fn bug_what_is_farther_than_a_shape_may_be_large_is_hit_too() {
             assert!(off <= slack, "{off} {found:?}");
         }
     }
-    // A half-space near by, of which all the ray is asked first.
+    // A half-space that is tested first against the whole ray.
     let floor = "name = \"floor\"\nid = 9\nmoves = false\nshape = { type = \"half_space\", normal = [0, 0, 1], offset = -5.0 }\n";
     let rig = Rig::new(&scene("", &[floor.to_owned()]));
     let found = ask(
@@ -42,7 +42,7 @@ fn bug_what_is_farther_than_a_shape_may_be_large_is_hit_too() {
     assert!((point.z + 5.0).abs() <= 1e-12, "{found:?}");
 }
 
-/// How far rounding puts the end of a ray astray grows with its length, and is more than its height above a floor far out.
+/// The rounding error at the end of a ray grows with its length, and far out it exceeds the ray's height above a floor.
 #[test]
 fn bug_a_ray_along_a_half_space_hit_it_at_the_end_of_the_world() {
     let floor = "name = \"floor\"\nid = 9\nmoves = false\nshape = { type = \"half_space\", normal = [0, 0, 1], offset = 0.0 }\n";
@@ -62,7 +62,7 @@ fn bug_a_ray_along_a_half_space_hit_it_at_the_end_of_the_world() {
     }
 }
 
-/// What a ray hits of one body that stands at a pose.
+/// The hit of a ray on one body at a pose.
 fn cast(shape: &str, pose: &Pose, from: &Vec3, direction: &Vec3) -> RayFound {
     let mut rig = Rig::new(&scene("", &[body(1, [0.0; 3], shape, "")]));
     rig.place(1, pose);
@@ -70,7 +70,7 @@ fn cast(shape: &str, pose: &Pose, from: &Vec3, direction: &Vec3) -> RayFound {
     ask(rig.engine.world(), &json(from, direction, ""))
 }
 
-/// Coarse pieces of a ray are known worse than fine ones: what they called a touch was not looked into.
+/// Coarse pieces of a ray have larger errors than fine ones; a contact within these errors was not examined further.
 #[test]
 fn bug_a_ray_that_grazes_a_cone_is_not_hit_before_it_is_there() {
     let shape =
@@ -126,8 +126,8 @@ fn bug_the_point_where_a_ray_passes_the_rim_of_a_sheet_is_on_it() {
     }
 }
 
-/// Of a ball, a capsule and a box: the shape, its distance from a point, and a place of its surface with a direction
-/// that passes there.
+/// For a ball, a capsule or a box: the shape, its distance function, a point of its surface, and a direction that
+/// grazes it there.
 fn grazed(kind: usize, rng: &mut Rng) -> (String, fn(&Vec3) -> f64, Vec3, Vec3) {
     match kind {
         0 => {
@@ -186,7 +186,8 @@ fn rays_that_graze_are_told_on_the_surface_or_not_at_all() {
             continue;
         };
         hits += 1;
-        // They are convex: by then it was as near as at the end of its stretch, or where it passes the place.
+        // The shapes are convex, so the closest approach up to the hit is at the end of the interval or at the grazed
+        // point.
         let last = away(until).min(away(until.min(far)));
         let best = away(found.t_best_m.unwrap());
         worst = worst.max(best).max(last);

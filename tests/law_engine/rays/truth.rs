@@ -1,4 +1,4 @@
-//! Where a ray meets shapes, by formulas.
+//! Intersections of rays with shapes, by formulas.
 
 use sweepd::math::Vec3;
 
@@ -17,10 +17,10 @@ const CORNERS: [[f64; 3]; 5] = [
     [-1.0, 1.0, 0.0],
     [0.0, 0.0, 1.0],
 ];
-/// A sheet that is no solid.
+/// A sheet that is not a solid.
 const SHEET: [[f64; 3]; 3] = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.2], [0.0, 1.0, 0.0]];
 
-/// A body's shape of each kind, as a scene has it.
+/// The shape of each kind, as scene text.
 pub(super) fn shape(kind: usize) -> String {
     match kind {
         0 => "{ type = \"sphere\", radius = 0.7 }".to_owned(),
@@ -64,7 +64,7 @@ fn of_triangle(o: &Vec3, d: &Vec3, [a, b, c]: [Vec3; 3]) -> Option<f64> {
     inside.then_some(t)
 }
 
-/// Whether it begins within, and where it meets each face.
+/// Whether the ray begins inside, and its intersections with the faces.
 fn of_box(o: &Vec3, d: &Vec3, half: Vec3) -> (bool, Vec<f64>) {
     let faces = (0..3).flat_map(|k| [(k, half[k]), (k, -half[k])]);
     let on = |t: f64, but: usize| (0..3).all(|k| k == but || (o + d * t)[k].abs() <= half[k]);
@@ -75,9 +75,9 @@ fn of_box(o: &Vec3, d: &Vec3, half: Vec3) -> (bool, Vec<f64>) {
     (is_in, met.map(|(_, t)| t).collect())
 }
 
-/// The same of a cone of radius 0.6 at -0.5, apex at 0.5.
+/// The same for a cone of radius 0.6 at z = -0.5 with its apex at z = 0.5.
 fn of_cone(o: &Vec3, d: &Vec3) -> (bool, Vec<f64>) {
-    // The radius is k (h - z).
+    // The radius at height z is k (h - z).
     let (k, h) = (0.6, 0.5);
     let across = |v: &Vec3| (v.x * v.x + v.y * v.y).sqrt();
     let (z, dz) = (k * (h - o.z), -k * d.z);
@@ -93,7 +93,7 @@ fn of_cone(o: &Vec3, d: &Vec3) -> (bool, Vec<f64>) {
     (across(o) < z && o.z.abs() < h, met)
 }
 
-/// Where a ray in the shape's frame meets it first: all that it meets by formulas, those on it kept.
+/// First intersection of a ray with a shape, in the shape's frame: the least of all formula results that lie on it.
 pub(super) fn truth(kind: usize, o: &Vec3, d: &Vec3) -> Option<f64> {
     let side = |t: f64| o + d * t;
     let across = |v: &Vec3| (v.x * v.x + v.y * v.y).sqrt();

@@ -1,4 +1,5 @@
-//! What is asked of bodies whose places are not known, that hang on others, of which there are too many, or not at all.
+//! Questions about bodies whose poses are unknown, which are attached to others, of which there are too many, or which
+//! cannot be asked for.
 
 use std::collections::BTreeSet;
 
@@ -23,7 +24,7 @@ fn a_body_whose_place_is_not_known_is_named_and_never_missing() {
         ball(9, 60.0, "on_stale = \"hold\""),
     ];
     let mut rig = Rig::new(&scene("", &bodies));
-    // Before any pose has come: those that the filters leave in, all of them.
+    // Before the first pose, all bodies that the filters allow are unknown.
     let error = question(rig.engine.world(), r#"{"body": "b1"}"#).unwrap_err();
     assert!(error.contains("not_received"), "{error}");
     let there = r#"{"body": "b1", "position": [0, 0, 0]}"#;
@@ -49,13 +50,13 @@ fn a_body_whose_place_is_not_known_is_named_and_never_missing() {
     let found = ask(rig.engine.world(), there);
     assert!(found.complete && found.unknown.is_empty(), "{found:?}");
     assert_eq!(names(&found).len(), 4, "{found:?}");
-    // A pose that is refused, far away: it may be anywhere.
+    // Its pose is rejected, far away: the body may be anywhere.
     rig.row(3).position[0] = f64::NAN;
     rig.send(ALL);
     let found = ask(rig.engine.world(), there);
     assert_eq!(unknown(&found), status(&["b3"], "rejected"));
-    // Too old: one may have come near, one that is held is told where it was and may be elsewhere as one that was held
-    // far away may be here, one that is slow and far is no doubt.
+    // All poses are stale. A stale body may have come near. A held body is reported at its pose, but may be elsewhere,
+    // and a body held far away may be here. A slow body far away is no doubt.
     rig.row(3).position[0] = 50.0;
     rig.send(ALL);
     rig.idle(600_000_000, ALL);
@@ -111,7 +112,7 @@ fn what_hangs_on_a_body_goes_with_it_and_is_asked_for_too() {
         pairs(&all),
         [pair("b1", "b4"), pair("b3", "b5"), pair("b3", "b6")]
     );
-    // From the middle of the chain; what it hung on stays, and is met.
+    // A body from the middle of the chain: its parent stays where it is, and is met.
     let found = ask(
         rig.engine.world(),
         r#"{"body": "b2", "position": [0, 0.2, 0], "filters": false}"#,
@@ -149,7 +150,7 @@ fn what_there_is_no_room_for_is_counted_and_nothing_is_complete() {
     assert!(!found.complete && found.unknown.is_empty());
     let deepest = found.rows.iter().map(|row| row.known.gap_min_m.unwrap());
     assert!(deepest.is_sorted(), "worst first");
-    // Of a half-space those that are above it have no boxes to tell, and need no room.
+    // Bodies outside a half-space have no row, so that the limit of rows does not matter.
     let above = ask(
         rig.engine.world(),
         r#"{"shape": {"type": "half_space", "normal": [0, 0, 1], "offset": -1.5}}"#,
@@ -200,7 +201,7 @@ fn what_cannot_be_asked_is_answered_with_what_to_change() {
         let error = question(rig.engine.world(), json).unwrap_err();
         assert!(error.contains(wanted), "{json}: {error}");
     }
-    // One that is disabled is not there for others.
+    // A disabled body does not exist for others.
     let found = ask(rig.engine.world(), r#"{"body": "b1", "filters": false}"#);
     assert!(
         found.rows.is_empty() && found.complete && found.ignored == 1,
@@ -208,7 +209,7 @@ fn what_cannot_be_asked_is_answered_with_what_to_change() {
     );
 }
 
-/// Not only the body that is looked for, the plane too may be nearer than where it was last.
+/// The half-space, not only the body in question, may be nearer than at its last pose.
 #[test]
 fn bug_a_half_space_that_is_stale_is_named_where_it_may_reach() {
     let gate = "{ type = \"half_space\", normal = [0, 0, 1], offset = 0.0 }";
