@@ -43,6 +43,10 @@ const NOBODY: Seat = Seat {
     attached: false,
 };
 
+/// Longest time between two updates with the pose of a chain of fixed links, nanoseconds: after a reset its body is
+/// unknown for so long.
+const AGAIN_NS: u64 = 500_000_000;
+
 /// A body of a source of common topics.
 #[derive(Debug)]
 struct Member {
@@ -180,7 +184,8 @@ impl Source {
             }
             // The pose of a chain of fixed links is repeated, so that it does not become stale; the refusal of a broken
             // chain is repeated until an update was made without a stall before it.
-            let due = receipt.now_ns.saturating_sub(member.told_ns) >= self.timeout_ns / 3;
+            let again_ns = AGAIN_NS.min(self.timeout_ns / 3);
+            let due = receipt.now_ns.saturating_sub(member.told_ns) >= again_ns;
             let lasts = match &found {
                 Ok(found) => found.received_ns.is_none(),
                 Err(_) => member.told_late,

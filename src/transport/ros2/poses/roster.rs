@@ -66,8 +66,10 @@ impl Source {
             return None;
         }
         member.seat.attached = attached;
-        if !attached && matches!(member.last, Some(Err(_))) {
-            // The refusal was not handed on while the body was attached.
+        // While the body was attached, refusals and poses of fixed links were not handed on: they hold still, and are
+        // reported again. A pose of links that change does not: it may be old.
+        let is_aging = matches!(&member.last, Some(Ok(found)) if found.received_ns.is_some());
+        if !attached && !is_aging {
             member.last = None;
         }
         Some((place, member.seat))

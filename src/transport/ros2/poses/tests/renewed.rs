@@ -45,3 +45,26 @@ fn a_chain_that_ends_is_never_said() {
         assert!(look(&mut one, now_ms * MS).is_empty());
     }
 }
+
+#[test]
+fn bug_a_body_on_fixed_links_was_unknown_for_long_once_it_was_let_go_or_reset() {
+    let mut one = tf("tool");
+    one.timeout_ns = 30_000 * MS;
+    one.take_links(&link("world", "tool", 0), true, at(MS));
+    assert_eq!(look(&mut one, MS).len(), 1);
+    assert!(look(&mut one, 2 * MS).is_empty());
+    // Nothing tells the node of a reset: the pose is repeated soon enough.
+    assert!(look(&mut one, 500 * MS).is_empty());
+    assert_eq!(look(&mut one, 501 * MS).len(), 1);
+    one.hang_body("a", true).unwrap();
+    assert!(look(&mut one, 502 * MS).is_empty());
+    one.hang_body("a", false).unwrap();
+    assert_eq!(look(&mut one, 503 * MS).len(), 1);
+    // A pose of links that change is not repeated: it may be old.
+    let mut one = tf("base");
+    one.take_links(&link("world", "base", MS), false, at(510 * MS));
+    assert_eq!(look(&mut one, 510 * MS).len(), 1);
+    one.hang_body("a", true).unwrap();
+    one.hang_body("a", false).unwrap();
+    assert!(look(&mut one, 511 * MS).is_empty());
+}
