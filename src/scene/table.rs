@@ -202,6 +202,11 @@ pub(crate) fn real(node: Node, what: &str) -> Result<f64, Fault> {
             reason = "a whole number stands for the nearest number"
         )]
         Value::Large(large) => large as f64,
+        // JSON has no NaN and no infinity: those who write it put null.
+        Value::Null => {
+            let text = format!("{what} is null, NaN or infinite: write a finite number");
+            return Err(Fault::new(node.at, text));
+        }
         _ => {
             let text = format!("{what} is {}: write a number", node.kind());
             return Err(Fault::new(node.at, text));
@@ -287,6 +292,17 @@ pub(crate) fn mend_name(name: &str, known: &[&str], header: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bug_a_number_that_json_cannot_write_was_told_as_null() {
+        let node = Node::from_json(b"[1, null, 2]").unwrap();
+        let fault = reals::<3>(node, "position").unwrap_err();
+        assert!(
+            fault.text.contains("null, NaN or infinite"),
+            "{}",
+            fault.text
+        );
+    }
 
     #[test]
     fn whole_numbers_keep_their_range() {

@@ -278,6 +278,7 @@ impl Inlet {
         let book = self.shared.book();
         let mut all = self.wrongs.words(&book, now_ns, 4 * FAULTS_NS);
         all.extend(self.lines.iter().filter_map(|line| line.fault(now_ns)));
+        all.extend(self.shared.lacks_clock().map(str::to_owned));
         all.extend(self.shared_topics());
         all.extend(self.unheard().into_iter().take(FAULTS_MAX));
         for source in &mut self.sources {

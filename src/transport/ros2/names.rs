@@ -5,6 +5,9 @@ use std::collections::BTreeMap;
 use super::args::RosArgs;
 use crate::config::ros_name::{is_topic, no_topic};
 
+/// Topics that ros2-client opens for each node, under these names whatever is remapped.
+const BY_CLIENT_LIBRARY: [&str; 2] = ["/rosout", "/parameter_events"];
+
 /// Makes full names for one node.
 #[derive(Clone, Debug)]
 pub struct Names {
@@ -27,7 +30,9 @@ impl Names {
             args: args.clone(),
             node,
             namespace,
-            taken: BTreeMap::new(),
+            taken: BY_CLIENT_LIBRARY
+                .map(|name| (name.to_owned(), (name.to_owned(), name.to_owned())))
+                .into(),
         })
     }
 
@@ -184,6 +189,16 @@ mod tests {
             error.contains("~/pairs") && error.contains("~/contacts"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn bug_a_topic_could_be_remapped_to_that_of_the_log() {
+        for own in BY_CLIENT_LIBRARY {
+            let mut names = names(&format!("-r ~/pairs:={own}"));
+            let error = names.claim("~/pairs").unwrap_err();
+            assert!(error.contains("~/pairs") && error.contains(own), "{error}");
+            assert!(names.claim_for_body(own).is_err());
+        }
     }
 
     #[test]

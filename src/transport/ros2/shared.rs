@@ -192,6 +192,13 @@ impl Shared {
         self.sim_time.load(Ordering::Relaxed)
     }
 
+    /// Text: the node uses the time of `/clock`, and none has come yet; `None`: it has, or it is not used.
+    pub(super) fn lacks_clock(&self) -> Option<&'static str> {
+        (self.sim_time() && self.sim_now_ns.load(Ordering::Relaxed) == 0).then_some(
+            "/clock: use_sim_time is set, and no time has come: stamps are 0 until a simulator publishes it",
+        )
+    }
+
     /// Takes a time of `/clock`; returns whether the clock restarted while the node uses its time.
     ///
     /// * `order` - order of the times of this clock.

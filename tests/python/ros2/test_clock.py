@@ -2,6 +2,7 @@
 
 import pytest
 from conftest import RELIABLE
+from diagnostic_msgs.msg import DiagnosticArray
 from frames import Sender, pose
 from geometry_msgs.msg import PoseStamped
 from rcl_interfaces.msg import Log
@@ -154,3 +155,17 @@ def test_without_use_sim_time_the_clock_says_nothing(room):
             room.spin(0.02)
     assert [end for end in world.ends(start) if end[0] == "a"] == []
     assert not any("went back" in log.msg for log in world.logs)
+
+
+def test_bug_a_clock_that_never_comes_was_told_nowhere(room):
+    room.daemon(SCENE, ros_args=["-p", "use_sim_time:=true"])
+    said = room.hear(DiagnosticArray, "/diagnostics")
+    clock = room.node().create_publisher(Clock, "/clock", RELIABLE)
+
+    def is_told():
+        return any("no time has come" in s.message or any("no time has come" in v.value for v in s.values) for m in said[-1:] for s in m.status)
+
+    room.until(is_told, "a word on it")
+    message = Clock()
+    message.clock.sec = 1_000
+    room.until(lambda: not is_told(), "no word on it any more", then=lambda: clock.publish(message))
