@@ -17,33 +17,33 @@ use crate::wire::{
 /// A row that names no body of its source.
 pub(super) const NO_BODY: BodySlot = BodySlot(u32::MAX);
 
-/// What became of a frame.
+/// Result of admitting a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Admission {
     /// Taken.
     Admitted {
-        /// Whose it is.
+        /// The source that sent it.
         source: SourceSlot,
         /// Poses admitted.
         poses: u64,
         /// Rows refused; counted by reason.
         refused_rows: u64,
     },
-    /// It waits for a later scene revision, for at most one time-out of its source.
+    /// Waits for a later scene revision, for at most one time-out of its source.
     Waiting {
-        /// Whose it is.
+        /// The source that sent it.
         source: SourceSlot,
     },
     /// Refused as a whole and counted.
     Refused {
-        /// Whose it is, as far as that is known.
+        /// The source that sent it, if known.
         source: Option<SourceSlot>,
-        /// Why.
+        /// The reason.
         reason: RejectReason,
     },
 }
 
-/// When a frame came and how old what it says is, nanoseconds of `CLOCK_BOOTTIME`.
+/// Receipt of a frame and start of the age of its content, nanoseconds of `CLOCK_BOOTTIME`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Times {
     pub(super) received_ns: u64,
@@ -51,7 +51,7 @@ pub(super) struct Times {
 }
 
 impl Times {
-    /// Those of one of a frame's rows, which may have an age of its own.
+    /// The times of one row of the frame, which may have an age of its own.
     pub(super) fn of_row(self, frame: &Frame, at: usize) -> Self {
         let own_ns = frame.since_ns.get(at).copied();
         let since_ns = own_ns.map_or(self.since_ns, |own_ns| own_ns.min(self.received_ns));
@@ -60,9 +60,9 @@ impl Times {
 }
 
 impl World {
-    /// Admits one frame, or says why not. Bad input is counted, never an error.
+    /// Admits one frame, or returns the reason for the refusal. Bad input is counted, never an error.
     ///
-    /// Cost: O(rows), of which rows that repeat the last pose bit by bit cost a compare.
+    /// Cost: O(rows); a row that repeats the last pose bit by bit costs a comparison.
     pub fn admit(&mut self, frame: &Frame, now_boot_ns: u64) -> Admission {
         self.now_ns = self.now_ns.max(now_boot_ns);
         let checked = self.check_frame(frame).and_then(|source| {
@@ -76,17 +76,17 @@ impl World {
         })
     }
 
-    /// Whether a frame is refused whoever speaks for its source, as far as its rows are not looked at.
+    /// Whether a frame is refused in whatever session its source is, its rows left aside.
     #[must_use]
     pub fn would_refuse(&self, frame: &Frame) -> bool {
         let session = frame.header.session;
         self.check_frame(frame).ok().is_none_or(|source| {
-            // The session in force is not over.
+            // The current session is not over.
             self.sources[source.index()].session != session && self.over.holds(source, session)
         })
     }
 
-    /// Layout, flags, counts and source: what can be said without looking at sessions.
+    /// Checks layout, flags, counts and source, which need no session.
     fn check_frame(&self, frame: &Frame) -> Result<SourceSlot, (Option<SourceSlot>, RejectReason)> {
         let header = &frame.header;
         let name = name_str(&header.source);
@@ -116,18 +116,18 @@ impl World {
         Ok(source)
     }
 
-    /// Tells which run of the daemon this is: frames that say another are refused.
+    /// Sets the boot id of this run of the daemon: frames with another one are refused.
     #[allow(clippy::cast_possible_truncation, reason = "the low half is meant")]
     pub fn set_boot(&mut self, boot_id: u64) {
         self.boot = boot_id as u32;
     }
 
-    /// Whether ids are those of another run of the daemon, where they may be other bodies'.
+    /// Whether ids are of another run of the daemon, where they may belong to other bodies.
     pub(super) fn is_of_other_boot(&self, boot: u32) -> bool {
         boot != 0 && self.boot != 0 && boot != self.boot
     }
 
-    /// Session, order, age, scene revision; then the rows.
+    /// Checks session, order, age and scene revision, then takes the rows.
     fn admit_of(&mut self, source: SourceSlot, frame: &Frame) -> Result<Admission, RejectReason> {
         let header = &frame.header;
         let times = self.times_of(frame);
@@ -152,19 +152,19 @@ impl World {
             state.cuts_next |= frame.cut;
             return Err(RejectReason::TooOld);
         }
-        // An older frame that still waits has nothing to say any more, unless it may have bodies that this one lacks or
-        // is a part of a body's way.
+        // An older frame that still waits is superseded, unless it may have bodies that this one lacks, or is part of
+        // the path of a continuous body.
         let stands_for_older = header.flags == frame_flags::FULL && !state.followed;
         let older_until_ns = if is_first || stands_for_older {
             state.pass_over_waiting()
         } else {
             None
         };
-        // A pause has no rows that could be of another scene.
+        // A pause has no rows that could belong to another scene revision.
         let has_rows = header.flags != frame_flags::PAUSED;
         if has_rows && (header.scene_rev > self.scene_rev || state.waits()) {
             let own_until_ns = times.received_ns.saturating_add(state.timeout_ns);
-            // The stream waits, not each of its frames: one that takes another's place would put off the end for ever.
+            // The limit counts for the stream, not for each frame: otherwise each replacement would extend it.
             let until_ns = match older_until_ns {
                 Some(older_ns) if !is_first => older_ns.min(own_until_ns),
                 _ => own_until_ns,
@@ -175,7 +175,7 @@ impl World {
         Ok(self.take(source, frame, times))
     }
 
-    /// Age counts from `sent_ns`, never later than receipt, and receipt is never later than now.
+    /// Times of a frame: its age starts at `sent_ns`, at latest at receipt, and receipt is at latest now.
     fn times_of(&self, frame: &Frame) -> Times {
         let received_ns = match frame.received_ns {
             0 => self.now_ns,
@@ -191,12 +191,12 @@ impl World {
         }
     }
 
-    /// A frame that nothing stands against: its rows, or what a pause renews.
+    /// Takes a frame that passed all checks: its rows, or the renewal by a pause.
     fn take(&mut self, source: SourceSlot, frame: &Frame, times: Times) -> Admission {
         let state = &mut self.sources[source.index()];
         state.frames += 1;
         let number = (frame.header.epoch, frame.header.seq);
-        // One that waited may be taken after a pause that it was sent before.
+        // A frame that waited may be taken after a pause that was sent later.
         let is_newer = |newest: FrameHeader| number > (newest.epoch, newest.seq);
         if state.newest.is_none_or(is_newer) {
             state.newest = Some(frame.header);
@@ -207,7 +207,7 @@ impl World {
         let cut = std::mem::take(&mut state.cuts_next) || frame.cut;
         if frame.header.flags == frame_flags::PAUSED {
             state.cuts_next = cut;
-            // The poses that hold are those of its sender's last pose frame, which may not be those that are known.
+            // A pause confirms the poses of the last pose frame sent, which may not have been received.
             if !state.waits() {
                 if state.gap == 0 {
                     self.renew_last_poses(source, frame.header.stamp_ns, times);
@@ -224,7 +224,7 @@ impl World {
             state.gap = 0;
         }
         state.pose_frames = state.pose_frames.saturating_add(1);
-        // Its list of rows is worked on outside of the world, and put back.
+        // The list of rows is moved out of the world while it is used.
         let mut rows = std::mem::take(&mut state.rows);
         let refused_rows = self.find_rows(source, &frame.transforms, &mut rows);
         let refused_rows = refused_rows + self.take_rows(source, frame, &rows, times);
@@ -243,7 +243,7 @@ impl World {
         }
     }
 
-    /// Finds each row's body, checks that this source may move it, and marks bodies that stand there twice.
+    /// Finds each row's body, checks that this source may move it, and marks bodies that occur twice.
     ///
     /// * `rows` - in: the slots of the source's last pose frame; out: those of this one, `NO_BODY` where refused.
     fn find_rows(
@@ -300,22 +300,22 @@ impl World {
         }
     }
 
-    /// What was known of a source's bodies is void: their pairs end, they are not received.
+    /// Makes all bodies of a source `not_received`; their pairs end.
     pub(super) fn forget_poses(&mut self, source: SourceSlot) {
         for index in 0..self.bodies.len() {
             let slot = BodySlot::at(index);
-            // Its root is not up to date while a request is applied.
+            // Attachments are read directly: `root` is not up to date while a request is applied.
             if self.hold_of(slot).is_none()
                 && self.body(slot).is_some_and(|body| owns(source, body))
             {
                 self.forget_pose(slot);
             }
         }
-        // Their pairs end with those of the bodies that they hang on, which may come back in this very tick.
+        // Pairs of attached bodies end together with those of their roots, which may come back in the same tick.
         self.settle_attached();
     }
 
-    /// One body is not received again.
+    /// Makes one body `not_received`.
     pub(super) fn forget_pose(&mut self, slot: BodySlot) {
         let entry = &mut self.entries[slot.index()];
         entry.has_pose = false;
@@ -335,8 +335,8 @@ impl World {
         self.settle(slot, false);
     }
 
-    /// Tells header and receipt (`CLOCK_BOOTTIME`, nanoseconds) of the newest frame of each source that was admitted
-    /// since the last call.
+    /// Calls `tell` with header and receipt (nanoseconds of `CLOCK_BOOTTIME`) of the newest frame of each source that
+    /// was admitted since the last call.
     pub fn tell_admitted(&mut self, mut tell: impl FnMut(&FrameHeader, u64)) {
         for source in &mut self.sources {
             if let Some((header, received_ns)) = source.admitted.take() {
@@ -345,8 +345,8 @@ impl World {
         }
     }
 
-    /// Admits the frames of a source that waited, where the scene has come to their revision; refuses them where the
-    /// wait is over.
+    /// Admits waiting frames of a source whose scene revision has been reached, and refuses those that have waited too
+    /// long.
     pub(super) fn flush_waiting(&mut self, source: SourceSlot) {
         loop {
             let state = &mut self.sources[source.index()];

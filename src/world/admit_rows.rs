@@ -1,4 +1,4 @@
-//! The rows of an admitted frame: poses taken, ages renewed, bad ones refused with their bodies.
+//! The rows of an admitted frame: takes poses, renews ages, refuses bad rows together with their bodies.
 //!
 //! In: a frame whose rows have been matched with bodies. Out: bodies placed and settled. A row that repeats the last
 //! pose bit by bit only renews the age.
@@ -15,8 +15,7 @@ use crate::math::{Pose, Vec3, pose_from};
 use crate::wire::{BodyStatus, Frame, RejectReason, TransformRow};
 
 impl World {
-    /// Takes the poses of the rows that were found. Of a body that stands there twice no row is taken: which one is
-    /// its newest pose nobody can say.
+    /// Takes the poses of the rows that were found. A body with two rows is refused: its newest pose is not known.
     pub(super) fn take_rows(
         &mut self,
         source: SourceSlot,
@@ -75,7 +74,7 @@ impl World {
         refused
     }
 
-    /// Bodies of this source whose newest pose the transport could not make out.
+    /// Refuses bodies of this source whose newest pose the transport could not determine.
     pub(super) fn refuse_bodies(&mut self, source: SourceSlot, frame: &Frame) -> u64 {
         for &(body, reason) in &frame.refused_bodies {
             self.note_reject(reason, Some(source));
@@ -87,9 +86,9 @@ impl World {
         u64::try_from(frame.refused_bodies.len()).unwrap_or(u64::MAX)
     }
 
-    /// A good row: its stamp, velocity and age.
+    /// Takes stamp, velocity and age of a good row.
     ///
-    /// * returns - whether the velocity of a body that pairs may have is another one now.
+    /// * returns - whether the velocity of a body in the broad phase changed.
     fn renew(
         &mut self,
         slot: BodySlot,
@@ -105,7 +104,7 @@ impl World {
             body.since_ns = Some(times.since_ns);
             body.received_ns = times.received_ns;
             body.lent_timeout_ns = u64::MAX;
-            // A body at rest is not settled again for it.
+            // A body that has not moved is not settled again, so its tag is set here.
             if other_speed {
                 self.tags.set(slot, Some(Tag::of(body)));
             }
@@ -114,9 +113,8 @@ impl World {
         false
     }
 
-    /// What a continuous body turned by since its last pose, by its sender's word: angular velocity times the time
-    /// between the two stamps, radians; from the last pause that said it stood there still, where one came meanwhile.
-    /// `None` where it says neither.
+    /// Rotation of a continuous body since its last pose, as declared by its sender: angular velocity times the time
+    /// between the stamps, radians. A pause in between starts the time anew. `None` without a velocity or stamps.
     fn declared_turn(
         &self,
         slot: BodySlot,
@@ -126,7 +124,7 @@ impl World {
         let body = self.body(slot).filter(|body| body.path.is_some())?;
         let turning = velocity?.angular_radps;
         let entry = &self.entries[slot.index()];
-        // The stamp of what it hung on is of another clock.
+        // The stamp of a former root may come from another clock.
         let is_own = entry.raw[0].is_finite();
         let stood_ns = match entry.stood_ns {
             Some(0) => 0,
@@ -140,9 +138,9 @@ impl World {
         Some(turning * time_s)
     }
 
-    /// A good row: its pose, where it is not the one the body has.
+    /// Takes the pose of a good row, if it differs from the body's.
     ///
-    /// * returns - whether that moved it.
+    /// * returns - whether the body moved.
     fn accept(
         &mut self,
         slot: BodySlot,
@@ -159,7 +157,7 @@ impl World {
             entry.has_pose = true;
             entry.refused = false;
         } else if let Some(at) = self.body(slot).filter(|b| b.path.is_some()).map(|b| b.pose) {
-            // It stands still for a leg, or has turned about itself by whole turns.
+            // The pose is repeated: the body stood still for a leg, or turned by whole turns.
             moved = self.travel(slot, &at, declared);
         }
         let Some(body) = self.bodies[slot.index()].as_mut() else {
@@ -168,7 +166,7 @@ impl World {
         body.reject = body.vertices.as_ref().and_then(|v| v.refused);
         let known = body.status == BodyStatus::Known && body.in_broad;
         if known && young && !moved {
-            // The common case of a world at rest: nothing but the age is new.
+            // The common case of a scene at rest: only the age changes.
             let stamp_ns = body.stamp_ns;
             self.ages.set(slot, Some(deadline_ns), Some(stamp_ns));
             self.touch(slot);
@@ -178,7 +176,7 @@ impl World {
         moved
     }
 
-    /// The newest pose of a body was refused: it is unknown until a good one comes; its last good one is kept.
+    /// Refuses the newest pose of a body: the body is unknown until a good one comes; its last good one is kept.
     fn refuse_pose(&mut self, slot: BodySlot, reason: RejectReason) {
         self.note_refused_body(reason, slot);
         self.entries[slot.index()].refused = true;
@@ -188,15 +186,15 @@ impl World {
         self.settle(slot, false);
     }
 
-    /// A paused frame: the poses of the last pose frame still hold, for one more time-out.
+    /// Renews the poses of the last pose frame for one more time-out, because of a paused frame.
     ///
-    /// * `stamp_ns` - of that frame; 0: it says none.
+    /// * `stamp_ns` - stamp of the paused frame; 0: none.
     pub(super) fn renew_last_poses(&mut self, source: SourceSlot, stamp_ns: u64, times: Times) {
         let number = self.sources[source.index()].pose_frame;
         let rows = std::mem::take(&mut self.sources[source.index()].rows);
         for &slot in rows.iter().filter(|slot| **slot != NO_BODY) {
             let entry = &mut self.entries[slot.index()];
-            // A body put anew or reset since has no pose that could be renewed.
+            // A body that was put again or reset since has no pose to renew.
             if entry.seen != number || !entry.has_pose || entry.refused || number == 0 {
                 continue;
             }
@@ -215,7 +213,7 @@ fn raw_of(row: &TransformRow) -> [f64; 7] {
     [x, y, z, i, j, k, w]
 }
 
-/// Bit by bit; a row that holds NaN is never the same as one that was admitted.
+/// Compares bit by bit; a row with NaN never equals an admitted one.
 fn same_raw(one: &[f64; 7], other: &[f64; 7]) -> bool {
     one[0].is_finite()
         && one
@@ -224,7 +222,7 @@ fn same_raw(one: &[f64; 7], other: &[f64; 7]) -> bool {
             .all(|(a, b)| a.to_bits() == b.to_bits())
 }
 
-/// The pose of a row, or what is wrong with it.
+/// The pose of a row, or the reason for its refusal.
 fn pose_of(row: &TransformRow) -> Result<Pose, RejectReason> {
     let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
     if !finite(&row.position) || !finite(&row.orientation) {

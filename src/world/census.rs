@@ -1,10 +1,10 @@
-//! What the filters make of the scene as a whole: how many pairs are ignored, and which pairs are always candidates.
+//! Effects of the filters on the whole scene: the number of ignored pairs, and the pairs that are always candidates.
 //!
-//! In: the compiled filters. Out: a count and a sorted list; both anew when the scene changes, never in between.
+//! In: the compiled filters. Out: a count and a sorted list, computed again when the scene changes.
 //!
-//! The count needs no walk over all pairs: bodies of which the pattern rules say the same form a class, classes are
-//! decided once a pair that a rule speaks of, rigid groups and roots add what their sizes say, and the pairs of
-//! neighbours and of plain rules are put right one by one.
+//! The count does not visit all pairs. Bodies that match the same pattern rules form a class, and each pair of classes
+//! that a rule matches is decided once. Rigid groups and roots add pairs according to their sizes. Pairs of neighbours
+//! and of plain rules are corrected one by one.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -22,10 +22,11 @@ pub(super) const FORCED_PER_RULE_MAX: usize = 1 << 12;
 /// widened, by the whole distance: a box in a crowd that is widened by twice as much meets up to eight times as many.
 const LOPSIDED: usize = 8;
 
-/// What makes bodies alike for pattern rules: which speak of them and on which side, and whether they can be paired.
+/// The properties that a class shares: the pattern rules that match, with their sides, and the flags that decide
+/// whether a pair is possible.
 type Kind<'a> = (&'a [(u32, u8)], u16);
 
-/// Bodies of a kind.
+/// Bodies of the same kind.
 struct Class<'a> {
     sided: &'a [(u32, u8)],
     count: u64,
@@ -33,7 +34,7 @@ struct Class<'a> {
     hot: &'a Hot,
 }
 
-/// The classes, and that of each slot; `None`: no body.
+/// All classes, and the class of each slot; `None`: no body.
 struct Classes<'a> {
     list: Vec<Class<'a>>,
     of_slot: Vec<Option<u32>>,
@@ -42,13 +43,12 @@ struct Classes<'a> {
 impl Filters {
     /// Counts the ignored pairs, whether their bodies are enabled or not.
     ///
-    /// Cost: O(bodies + n log n of those that a pattern rule, a group or another body has + plain rules + pairs of
-    /// classes that a pattern rule speaks of), where a class is what the same pattern rules speak of; in a rigid group
-    /// or on one root, all pairs of its classes.
+    /// Cost: O(bodies + n log n + plain rules + pairs of classes that a pattern rule matches + pairs of classes within
+    /// one rigid group or root), where n counts the bodies with a pattern rule, a group or an attachment.
     pub(super) fn count_ignored(&mut self, names: &Names) {
         let classes = self.classes();
         let mut ignored = self.count_by_patterns(&classes);
-        // Rigid groups and roots, where no rule speaks; what is alike in both is counted once.
+        // Pairs within rigid groups and roots that no rule matches; pairs that share both are counted once.
         let alike = |key: fn(&Hot) -> u64, has: &dyn Fn(&Hot) -> bool| {
             let keyed = self.bodies.iter().zip(&classes.of_slot);
             let keyed = keyed.filter(|(hot, _)| has(hot));
@@ -63,12 +63,12 @@ impl Filters {
         );
         let both = |hot: &Hot| u64::from(hot.rigid) << 32 | u64::from(hot.root.0);
         let grouped = |hot: &Hot| hot.rigid != NO_GROUP;
-        // Most bodies hang on none, and nothing on them: those are alike with nobody.
+        // Most bodies have no attachment: their roots have no other member.
         let hanging = self.bodies.iter().filter(|hot| hot.root != hot.name);
         let roots: BTreeSet<NameId> = hanging.map(|hot| hot.root).collect();
         let is_of_tree = |hot: &Hot| roots.contains(&hot.root);
         ignored += alike(rigid, &grouped) + alike(root, &is_of_tree) - alike(both, &grouped);
-        // The exceptions: what was said without them is taken back, what holds is put in its place.
+        // Exceptions: the decision made without them is taken back and replaced.
         for key in self.exceptions(names) {
             let (a, b) = key.slots();
             let (hot_a, hot_b) = (&self.bodies[a.index()], &self.bodies[b.index()]);
@@ -83,7 +83,7 @@ impl Filters {
         let mut places: BTreeMap<Kind<'_>, u32> = BTreeMap::new();
         let mut list: Vec<Class<'_>> = Vec::new();
         let mut of_slot = Vec::with_capacity(self.bodies.len());
-        // Of bodies that no pattern rule speaks of, which may be all, by their flags.
+        // Classes of bodies without a pattern rule (often all bodies), by flags.
         let mut plain = [None; 4];
         for hot in &self.bodies {
             if !hot.has(LIVE) {
@@ -112,9 +112,9 @@ impl Filters {
         Classes { list, of_slot }
     }
 
-    /// The pairs that the last pattern rule of both ignores.
+    /// Counts the pairs whose last matching pattern rule ignores them.
     fn count_by_patterns(&self, classes: &Classes<'_>) -> u64 {
-        // By rule, the classes of its sides.
+        // By rule: the classes that match each side.
         let mut of_rule: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
         for (place, class) in classes.list.iter().enumerate() {
             for &(rule, sides) in class.sided {
@@ -127,7 +127,7 @@ impl Filters {
             }
         }
         let mut ignored = 0;
-        // Which class each one was decided with last: rules may speak of a pair more than once.
+        // The class that each one was last decided with: several rules may match one pair.
         let mut decided = vec![u32::MAX; classes.list.len()];
         for (place, class) in classes.list.iter().enumerate() {
             let a = small(place);
@@ -149,7 +149,7 @@ impl Filters {
         ignored
     }
 
-    /// How many pairs of two classes the pattern rules ignore.
+    /// Number of pairs of two classes that the pattern rules ignore.
     fn ignored_of_two(&self, a: &Class<'_>, b: &Class<'_>, same: bool) -> u64 {
         if never(a.hot, b.hot).is_some() {
             return 0;
@@ -160,9 +160,9 @@ impl Filters {
         }
     }
 
-    /// The pairs of bodies with one key that could be paired and of which no pattern rule speaks.
+    /// Counts the pairs of bodies with equal keys that could be paired and that no pattern rule matches.
     ///
-    /// * `keyed` - the key and the class of each body that has one.
+    /// * `keyed` - key and class of each body that has a key.
     fn count_alike(&self, classes: &Classes<'_>, keyed: impl Iterator<Item = (u64, u32)>) -> u64 {
         let mut keyed: Vec<(u64, u32)> = keyed.collect();
         keyed.sort_unstable();
@@ -190,7 +190,7 @@ impl Filters {
         alike
     }
 
-    /// A pair, plain rules and neighbours left aside.
+    /// Decides a pair without plain rules and neighbours.
     fn decide_plainly(&self, a: &Hot, b: &Hot) -> Because {
         if let Some(never) = never(a, b) {
             return never;
@@ -202,7 +202,7 @@ impl Filters {
         }
     }
 
-    /// As [`Filters::decide`], enabled or not.
+    /// As [`Filters::decide`], whether the bodies are enabled or not.
     pub(super) fn decide_enabled(&self, a: &Hot, b: &Hot) -> Because {
         if let Some(never) = never(a, b) {
             return never;
@@ -214,7 +214,7 @@ impl Filters {
         }
     }
 
-    /// The pairs of neighbours and of plain rules whose bodies are there.
+    /// The pairs of neighbours and of plain rules whose bodies exist.
     fn exceptions(&self, names: &Names) -> BTreeSet<PairKey> {
         let mut keys = BTreeSet::new();
         let mut put = |slot: usize, other: NameId| {
@@ -238,10 +238,10 @@ impl Filters {
         keys
     }
 
-    /// Finds the pairs that rules report farther than their bodies' boxes are widened, and for rules with too many of
-    /// them the margin that makes their boxes meet instead.
+    /// Finds the pairs that rules report beyond the distance by which their boxes are widened. A rule with too many
+    /// such pairs widens the boxes of its bodies instead.
     ///
-    /// * returns - whether there are such margins, or were.
+    /// * returns - whether there are such margins now, or were before.
     pub(super) fn find_forced(&mut self, names: &Names) -> bool {
         self.forced.clear();
         let were_any = std::mem::take(&mut self.any_margin);
@@ -279,7 +279,7 @@ impl Filters {
         were_any || self.any_margin
     }
 
-    /// Whether this rule decides an allowed pair, and reports it farther than the boxes are widened.
+    /// Whether this rule decides an allowed pair and reports it beyond the distance by which the boxes are widened.
     fn is_forced(&self, a: BodySlot, b: BodySlot, rule: usize, report_within_m: f64) -> bool {
         let (hot_a, hot_b) = (&self.bodies[a.index()], &self.bodies[b.index()]);
         report_within_m > hot_a.report_within_m + hot_b.report_within_m
@@ -309,7 +309,7 @@ fn widen_sides(margins_m: &mut [f64], (side_a, side_b): (&[BodySlot], &[BodySlot
     }
 }
 
-/// Pairs of bodies of two classes, or within one.
+/// Number of pairs of bodies of two classes, or within one.
 fn pairs_of(count_a: u64, count_b: u64, same: bool) -> u64 {
     if same {
         count_a * (count_a - 1) / 2

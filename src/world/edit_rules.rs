@@ -1,4 +1,4 @@
-//! Edits that touch many bodies: pair rules, margins, reset, and what the filters make of the scene afterwards.
+//! Edits that affect many bodies (pair rules, margins, reset), and the update of the filters after them.
 
 use std::collections::BTreeSet;
 
@@ -9,23 +9,23 @@ use crate::ids::BodySlot;
 use crate::scene::PairRule;
 use crate::wire::EndCause;
 
-/// What edits changed of what the filters make of the scene; each says all that those before it say.
+/// Parts of the filters that edits have made outdated; each value includes those before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Uncounted {
     #[default]
     Nothing,
-    /// Which pairs are forced, and how wide boxes are.
+    /// Forced pairs, and margins of boxes.
     Forced,
-    /// Which pairs are ignored.
+    /// The number of ignored pairs.
     Bodies,
-    /// What the rules say of each body.
+    /// The rules that match each body.
     Rules,
 }
 
 impl World {
-    /// The rules as the edits of a request make them, compiled once behind the last; whether they changed.
+    /// Applies all edits of rules in a request, and compiles the rules once; returns whether they changed.
     ///
-    /// What other edits make of the bodies has no say in it: what counts is the scene after the request.
+    /// Rules do not depend on the other edits of the request: they apply to the scene after it.
     ///
     /// * `step` - called after each rule that was compiled, and after each search for its bodies.
     pub(super) fn edit_rules(&mut self, edits: &[Edit], step: &mut dyn FnMut()) -> bool {
@@ -53,7 +53,7 @@ impl World {
         true
     }
 
-    /// A new search for the pairs of all bodies that these rules speak of.
+    /// Requests a new search for the pairs of all bodies that these rules match.
     ///
     /// * `step` - called after each side.
     fn requery_named(&mut self, rules: &[&PairRule], step: &mut dyn FnMut()) {
@@ -73,7 +73,8 @@ impl World {
         }
     }
 
-    /// Sets the distance that pairs of a body, or of all, are told as near within; whether any was another.
+    /// Sets the distance within which pairs of a body, or of all bodies, are reported as near; returns whether any
+    /// changed.
     pub(super) fn set_margins(&mut self, name: Option<&str>, report_within_m: Option<f64>) -> bool {
         let Some(name) = name else {
             let slots = 0..self.bodies.len();
@@ -101,7 +102,7 @@ impl World {
             hot.report_within_m = wanted_m;
         }
         self.touched.push(slot);
-        // Its pairs are judged anew; its box is widened as it must be now by the recount that follows.
+        // Its pairs are judged again; the recount that follows widens its box.
         self.requery(slot);
         true
     }
@@ -127,7 +128,7 @@ impl World {
         self.settle_attached();
     }
 
-    /// Ends the pairs of a body that stays in the broad phase, and has them begin anew.
+    /// Ends the pairs of a body that stays in the broad phase, so that they begin again.
     pub(super) fn begin_anew(&mut self, slot: BodySlot) {
         if self.body(slot).is_some_and(|body| body.in_broad) {
             self.lists.remove(slot, EndCause::Reset);
@@ -135,11 +136,9 @@ impl World {
         }
     }
 
-    /// What the filters make of the scene after the edits of a tick: what the rules say of each body, ignored and
-    /// forced pairs, and how wide boxes must be.
+    /// Updates the filters after the edits of a tick: rules of each body, ignored and forced pairs, margins of boxes.
     ///
-    /// Cost: where neither rules nor groups speak of bodies, that of those that were touched and a walk over what the
-    /// filters have of all.
+    /// Cost: without rules and groups, that of the touched bodies, and a scan of the filters' flags of all bodies.
     pub(super) fn recount(&mut self) {
         let uncounted = std::mem::take(&mut self.uncounted);
         if uncounted == Uncounted::Nothing {
@@ -164,7 +163,7 @@ impl World {
         }
     }
 
-    /// Settles a body whose box must be wider or narrower than it is.
+    /// Settles a body if the margin of its box has changed.
     fn widen(&mut self, slot: BodySlot) {
         let Some(body) = self.body(slot) else { return };
         let wanted_m = self.widening(slot, body, body.reach_m);

@@ -1,7 +1,7 @@
-//! Names, for a boot: a dense number for each, so that rules and neighbours never compare strings in a tick.
+//! Dense numbers for names, so that rules and neighbours compare no strings in a tick.
 //!
-//! In: names of bodies, parents and rules as they occur. Out: their numbers, and what a name keeps when its body is
-//! removed and put again (id, generation). Names are never dropped: an id stays with its name for a boot.
+//! In: names of bodies, parents and rules. Out: their numbers, and the data that a name keeps when its body is removed
+//! and put again (id, generation). Names are never dropped: an id stays with its name for a boot.
 
 use std::collections::BTreeMap;
 use std::ops::Bound;
@@ -32,7 +32,7 @@ pub(super) struct Name {
     pub(super) id: Option<BodyId>,
     /// Generation of the newest body of this name; 0: never put.
     pub(super) generation: u32,
-    /// Slot of its body now.
+    /// Current slot of its body.
     pub(super) slot: Option<BodySlot>,
 }
 
@@ -110,7 +110,7 @@ impl Names {
         self.ids.get(&id).map(|&name| self.get(name))
     }
 
-    /// Gives the name this id, or keeps the one it has, or (`None`) gives it the least free one.
+    /// The id of a name. A name without one gets `wanted`, or the least free id if that is `None`.
     pub(super) fn claim(&mut self, name: NameId, wanted: Option<BodyId>) -> BodyId {
         if let Some(id) = self.get(name).id {
             return id;

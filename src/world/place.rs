@@ -1,4 +1,4 @@
-//! Where a body is and how well that is known: status, reach, proxy, and what a change of them means to the lists.
+//! The place of a body and how well it is known: status, reach, proxy, and their changes in the lists of the tick.
 //!
 //! In: a pose, a refusal, an age, an edit. Out: the body as the engine sees it, and its place in the change set.
 
@@ -19,40 +19,40 @@ use crate::scene::BodySpec;
 use crate::shape::Geometry;
 use crate::wire::{BodyStatus, EndCause};
 
-/// What the world keeps of a body beside what the engine sees.
+/// Data of a body that only the world uses.
 #[derive(Clone, Debug)]
 pub(super) struct Entry {
     pub(super) spec: Option<Arc<BodySpec>>,
     pub(super) enabled: bool,
-    /// A pose was admitted since it was put or reset; always so for a body that cannot move.
+    /// Whether a pose was admitted since the body was put or reset; always true for a body that cannot move.
     pub(super) has_pose: bool,
-    /// Its newest pose was refused.
+    /// Whether its newest pose was refused.
     pub(super) refused: bool,
-    /// In `World::growing`.
+    /// Whether it is in `World::growing`.
     pub(super) growing: bool,
-    /// The last admitted row as it came: position, then quaternion x, y, z, w.
+    /// The last admitted row as received: position, then quaternion x, y, z, w.
     pub(super) raw: [f64; 7],
-    /// Stamp of a pause that said that it still stood where its last pose had it, nanoseconds; 0: it said none.
+    /// Stamp of the last pause that confirmed its pose, nanoseconds; 0: the pause had no stamp.
     pub(super) stood_ns: Option<u64>,
-    /// Number of the last pose frame that held it.
+    /// Number of the last pose frame that contained it.
     pub(super) seen: u64,
-    /// Number of the last pose frame that held it more than once.
+    /// Number of the last pose frame that contained it more than once.
     pub(super) twice: u64,
-    /// Tick in which its pose, age or what is known of it last changed.
+    /// Tick in which its pose, age or status last changed.
     pub(super) touched: u64,
-    /// Tight box at the body's pose; of a continuous body: around its way since the last tick.
+    /// Tight box at the body's pose; for a continuous body: around its path since the last tick.
     pub(super) tight: Aabb,
     /// By how much `Body::proxy` is wider than `tight`, metres.
     pub(super) widened_m: f64,
-    /// The body it hangs on and its pose there.
+    /// The body that it is attached to, and its pose relative to that body.
     pub(super) attach: Option<(NameId, Pose)>,
-    /// The body it hangs on in the end, itself where it hangs on none, and its pose seen from there.
+    /// The last body of its chain of attachments (itself without one), and its pose relative to that.
     pub(super) root: BodySlot,
     pub(super) root_pose: Pose,
 }
 
 impl Entry {
-    /// Of a slot without a body.
+    /// The entry of a slot without a body.
     pub(super) fn gone(slot: BodySlot) -> Self {
         Self {
             spec: None,
@@ -74,7 +74,7 @@ impl Entry {
     }
 }
 
-/// What is known of a body's place.
+/// How well the place of a body is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Judgement {
     pub(super) status: BodyStatus,
@@ -83,7 +83,7 @@ pub(super) struct Judgement {
 }
 
 impl World {
-    /// What is known of a body's place at `self.now_ns`.
+    /// Judges how well the place of a body is known at `self.now_ns`.
     pub(super) fn judge(&self, slot: BodySlot, body: &Body) -> Judgement {
         let entry = &self.entries[slot.index()];
         let root = &self.entries[entry.root.index()];
@@ -102,7 +102,7 @@ impl World {
         } else if !body.moves {
             (BodyStatus::Known, 0.0)
         } else if root.refused || vertices().any(|v| v.refused.is_some()) {
-            // Whatever its speed: who sends what is no pose may have broken more than that.
+            // Its `max_speed_mps` does not bound it: a sender of invalid poses may have other faults.
             (BodyStatus::Rejected, f64::INFINITY)
         } else if !(root.has_pose && has_vertices) {
             (BodyStatus::NotReceived, f64::INFINITY)
@@ -111,7 +111,7 @@ impl World {
         };
         let in_broad = match status {
             BodyStatus::Known | BodyStatus::Stale | BodyStatus::Held => true,
-            // Its last good pose is kept; without one there is nothing to keep.
+            // Kept at its last good pose, if it has one.
             BodyStatus::Rejected if root.has_pose && has_vertices => true,
             BodyStatus::NotReceived | BodyStatus::Rejected | BodyStatus::RemovedByAge => {
                 self.stays_for_its_way(slot)
@@ -125,14 +125,14 @@ impl World {
         }
     }
 
-    /// Age and what follows from it belong to the root; the speed is the body's own.
+    /// Judges by age. Age and `on_stale` are the root's; `max_speed_mps` is the body's own.
     fn judge_age(&self, body: &Body, root: BodySlot) -> (BodyStatus, f64) {
         let root_body = self.body(root).unwrap_or(body);
         if !self.is_too_old(root_body, self.now_ns) {
             return (BodyStatus::Known, 0.0);
         }
         match self.on_stale_of(root_body) {
-            // A younger frame may follow in this tick, of which alone the tick tells.
+            // A newer frame may follow within this tick.
             OnStale::Remove if self.admits && root_body.in_broad => (BodyStatus::Known, 0.0),
             OnStale::Hold => (BodyStatus::Held, 0.0),
             OnStale::Remove => (BodyStatus::RemovedByAge, f64::INFINITY),
@@ -140,13 +140,13 @@ impl World {
         }
     }
 
-    /// How far a body may be by now from its last good pose, metres; infinite without a bound.
+    /// Largest distance of a body from its last good pose by now, metres; infinite without a bound.
     fn reach_of(&self, body: &Body, root: BodySlot) -> f64 {
         let since_ns = self.body(root).unwrap_or(body).since_ns;
         let (Some(speed_mps), Some(since_ns)) = (body.max_speed_mps, since_ns) else {
             return f64::INFINITY;
         };
-        // Three roundings, each by half an ulp: four are added.
+        // Three roundings of half an ulp each; four are added.
         let age_s = self.now_ns.saturating_sub(since_ns) as f64 * 1e-9;
         let reach_m = (speed_mps * age_s * (1.0 + 8.0 * ROUND)).next_up();
         if reach_m <= self.stale_reach_m {
@@ -156,12 +156,12 @@ impl World {
         }
     }
 
-    /// Puts a body at a pose and takes its motion and tight box with it.
+    /// Puts a body at a pose, and updates its motion bound and tight box.
     ///
-    /// No length tells how far a half-space has moved: the pairs of one that cannot move, and whose certificates
-    /// therefore count its motion as none, begin anew where an edit moves it.
+    /// No length bounds the motion of a half-space. Certificates of one that cannot move count no motion, so if an edit
+    /// moves it, its pairs begin again.
     ///
-    /// * returns - whether that changed anything, bit by bit.
+    /// * returns - whether the pose changed, bit by bit.
     pub(super) fn place(&mut self, slot: BodySlot, pose: &Pose) -> bool {
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return false;
@@ -181,7 +181,7 @@ impl World {
         true
     }
 
-    /// Judges a body anew and brings proxy, flags, tallies and the change set in line with it.
+    /// Judges a body again, and updates its proxy, flags, counts and the change set.
     ///
     /// * `pose_changed` - whether [`World::place`] moved it since it was settled last.
     pub(super) fn settle(&mut self, slot: BodySlot, pose_changed: bool) {
@@ -222,12 +222,12 @@ impl World {
         );
     }
 
-    /// Deadline and growth that follow from a judgement.
+    /// Sets the deadline and the growth that follow from a judgement.
     fn watch(&mut self, slot: BodySlot, judged: Judgement) {
         let Some(body) = self.bodies[slot.index()].as_ref() else {
             return;
         };
-        // What hangs on another is judged as that is.
+        // An attached body is judged together with its root.
         let root = self.body(self.entries[slot.index()].root).unwrap_or(body);
         let deadline_ns = (body.moves && judged.status == BodyStatus::Known).then(|| {
             body.since_ns
@@ -243,7 +243,7 @@ impl World {
         }
     }
 
-    /// Notes a change in the lists of the tick.
+    /// Records a change in the lists of the tick.
     fn list(&mut self, slot: BodySlot, was_in: bool, now: Judgement, moved: bool, restated: bool) {
         match (was_in, now.in_broad) {
             (false, true) => {
@@ -261,9 +261,9 @@ impl World {
         }
     }
 
-    /// By how much a body's box is to be wider than tight at a reach, metres.
+    /// Widening of a body's tight box at a reach, metres.
     ///
-    /// A reach without bound leaves the box as it was: the pairs it has are kept, no new ones are made from it.
+    /// An infinite reach does not widen the box: existing pairs are kept, and no new ones are made.
     pub(super) fn widening(&self, slot: BodySlot, body: &Body, reach_m: f64) -> f64 {
         let margin_m = self.margin_of(slot, body);
         if reach_m.is_finite() {
@@ -273,13 +273,13 @@ impl World {
         }
     }
 
-    /// By how much a body's box is wider than tight when its place is known, metres.
+    /// Widening of the tight box of a body whose place is known, metres.
     pub(super) fn margin_of(&self, slot: BodySlot, body: &Body) -> f64 {
         let ruled_m = self.filters.margins_m.get(slot.index()).copied();
         body.report_within_m.max(ruled_m.unwrap_or_default())
     }
 
-    /// What the filters see of a slot.
+    /// The filters' data of a slot.
     pub(super) fn hot(&mut self, slot: BodySlot) -> Option<&mut Hot> {
         self.filters.bodies.get_mut(slot.index())
     }
@@ -290,7 +290,7 @@ pub(super) fn grows(status: BodyStatus, reach_m: f64) -> bool {
     status == BodyStatus::Stale && reach_m.is_finite()
 }
 
-/// Why the pairs of a body end when it leaves the broad phase.
+/// The cause of the ends of a body's pairs when it leaves the broad phase.
 fn cause_of(status: BodyStatus) -> EndCause {
     match status {
         BodyStatus::Disabled => EndCause::Disabled,
@@ -299,14 +299,14 @@ fn cause_of(status: BodyStatus) -> EndCause {
     }
 }
 
-/// A body at rest at its start pose, from what the scene says of it.
+/// A body at rest at its start pose, from its entry in the scene.
 pub(super) fn new_body(spec: &BodySpec, shapes: Parts, generation: u32) -> (Body, Aabb) {
     let is_half_space = |s: &PlacedShape| matches!(s.shape.geometry, Geometry::HalfSpace { .. });
     let unbounded = shapes.iter().any(is_half_space);
     let only_half_spaces = shapes.iter().all(is_half_space);
     let (centre, radius) = sphere_around(&shapes, unbounded);
     let tight = tight_box(&shapes, &spec.pose);
-    // A half-space has no box and no ball about it: there is nothing to sweep.
+    // A half-space has no bounding box or sphere, so it cannot be swept.
     let path = (spec.continuous && !unbounded).then(|| {
         let mut path = Path::new(centre, radius, spec.teleport_m, true);
         path.restart(tight);
@@ -330,7 +330,7 @@ pub(super) fn new_body(spec: &BodySpec, shapes: Parts, generation: u32) -> (Body
         path,
         vertices,
         proxy: tight.widened(spec.report_within_m),
-        // Settled right after; until then it counts as what it is before anything is known.
+        // The caller settles it; until then it has the status of a body without a pose.
         status: BodyStatus::NotReceived,
         reach_m: f64::INFINITY,
         reject: None,
@@ -355,7 +355,7 @@ pub(super) fn tight_box(shapes: &[PlacedShape], pose: &Pose) -> Aabb {
         let on = &placed.pose.translation.vector;
         let own = &placed.shape.aabb.max.coords;
         let tight = placed.shape.aabb_at(&(pose * placed.pose));
-        // The box is tight at the rounded product of the two poses; the true product is this near to it.
+        // The box is tight at the rounded product of the two poses; this bounds the distance to the true product.
         let rounding_m = 32.0 * ROUND * (at.amax() + on.amax() + own.amax());
         all.merged(&if rounding_m.is_finite() {
             tight.widened(rounding_m)
@@ -379,7 +379,7 @@ fn sphere_around(shapes: &[PlacedShape], unbounded: bool) -> (Point, f64) {
         .zip(shapes)
         .map(|(at, placed)| (at - centre).norm() + placed.shape.radius)
         .fold(0.0, f64::max);
-    // A rotation, a translation and a difference of coordinates no larger than these.
+    // Bounds the rounding of a rotation, a translation and a difference of coordinates of this size.
     let magnitude = shapes
         .iter()
         .map(|s| s.pose.translation.vector.amax() + s.shape.centre.coords.amax())

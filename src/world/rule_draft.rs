@@ -1,21 +1,21 @@
 //! The list of pair rules while a request edits it.
 //!
-//! In: the list as it was, and edits in their order. Out: the list they make; each edit costs a search, however long
-//! the list is, so that a request may hold as many of them as it has room for.
+//! In: the old list, and edits in order. Out: the new list. Each edit costs one search, so a request may hold any
+//! number of edits.
 
 use std::collections::BTreeMap;
 
 use super::rules::ignores;
 use crate::scene::PairRule;
 
-/// What makes two rules one: sides in a fixed order, which is `a`, what it does, and why. The sides come first, so
-/// that the rules of two sides stand together.
+/// Two rules with equal keys are the same: sides in a fixed order, which one is `a`, action, reason, distance. The
+/// sides come first, so that the rules of two sides are adjacent.
 type Key<'a> = (&'a str, &'a str, bool, bool, &'a str, Option<u64>);
 
-/// A list of rules without two that are the same: one further up has nothing to say behind the other.
+/// A list of rules without duplicates: the earlier of two equal rules has no effect.
 #[derive(Debug, Default)]
 pub(super) struct RuleDraft<'a> {
-    /// In order; `None` where one was taken out, never at the end.
+    /// The rules in order; `None`: removed. The last entry is never `None`.
     list: Vec<Option<&'a PairRule>>,
     places: BTreeMap<Key<'a>, usize>,
 }
@@ -33,7 +33,7 @@ impl<'a> RuleDraft<'a> {
         self.places.len()
     }
 
-    /// Adds a rule behind all others; whether it was not the last already.
+    /// Adds a rule at the end; returns whether it was not the last one already.
     pub(super) fn add(&mut self, rule: &'a PairRule) -> bool {
         let next = self.list.len();
         let old = self.places.insert(key(rule), next);
@@ -48,7 +48,7 @@ impl<'a> RuleDraft<'a> {
         true
     }
 
-    /// Takes out every rule of these two sides, in either order.
+    /// Removes and returns every rule of these two sides, in either order.
     pub(super) fn drop_of(&mut self, a: &'a str, b: &'a str) -> Vec<&'a PairRule> {
         let (low, high) = if a <= b { (a, b) } else { (b, a) };
         let from: Key<'a> = (low, high, false, false, "", None);
@@ -74,7 +74,7 @@ impl<'a> RuleDraft<'a> {
         self.list.iter().copied().flatten()
     }
 
-    /// The rules, in order, each a copy.
+    /// Copies of the rules, in order.
     pub(super) fn to_list(&self) -> Vec<PairRule> {
         self.iter().cloned().collect()
     }
@@ -83,7 +83,7 @@ impl<'a> RuleDraft<'a> {
 fn key(rule: &PairRule) -> Key<'_> {
     let (a, b) = (&*rule.a, &*rule.b);
     let (low, high) = if a <= b { (a, b) } else { (b, a) };
-    // Both zeros are one distance.
+    // 0.0 and -0.0 are the same distance.
     let report = rule.report_within_m.map(|metres| (metres + 0.0).to_bits());
     (low, high, a == low, ignores(rule), &rule.reason, report)
 }
@@ -97,7 +97,7 @@ mod tests {
         (rule.a == a && rule.b == b) || (rule.a == b && rule.b == a)
     }
 
-    /// The same, walking the whole list at each edit.
+    /// The same by a scan of the whole list at each edit.
     fn add(list: &mut Vec<PairRule>, rule: &PairRule) -> bool {
         let changes = list.last() != Some(rule);
         list.retain(|other| other != rule);

@@ -1,4 +1,4 @@
-//! Pair rules, compiled: for each name the rules that speak of it, so that a pair is decided by a short merge.
+//! Compiled pair rules: a list of rules for each name, so that a pair is decided by a short merge.
 //!
 //! In: the scene's rules, in order, and rules added by edits. Out: the last rule that matches a pair of names. A rule
 //! of two plain names costs one search; a rule with patterns is matched with each name once, when either turns up.
@@ -7,7 +7,7 @@ use super::names::{NameId, Names};
 use crate::ids::small;
 use crate::scene::{PairAction, PairRule, is_pattern, pattern_matches as matches};
 
-/// New names that are matched with the patterns one by one; of more, each pattern looks for its own.
+/// Up to this many new names are matched with each pattern; for more, each pattern searches the sorted names.
 const FEW_NAMES: usize = 16;
 
 /// The name stands on the `a` side of the rule.
@@ -15,7 +15,7 @@ pub(super) const SIDE_A: u8 = 1;
 /// The name stands on the `b` side of the rule.
 pub(super) const SIDE_B: u8 = 2;
 
-/// The rules that speak of one name.
+/// The rules that match one name.
 #[derive(Clone, Debug, Default)]
 struct OfName {
     /// Rules of two plain names: the other name and the rule, by name; of one pair the last rule only.
@@ -24,14 +24,14 @@ struct OfName {
     sided: Vec<(u32, u8)>,
 }
 
-/// The rules and what they say of each name.
+/// All rules, and those that match each name.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rules {
     list: Vec<PairRule>,
     of_name: Vec<OfName>,
     /// The rules with a pattern.
     patterned: Vec<u32>,
-    /// Names that these match, counted once per side.
+    /// Number of names that these match, counted once per side.
     matches: usize,
     any_report: bool,
 }
@@ -41,7 +41,7 @@ impl Rules {
         &self.list
     }
 
-    /// Takes the list out, to be edited and set again.
+    /// Moves the list out for an edit; it is set again afterwards.
     pub(super) fn take_list(&mut self) -> Vec<PairRule> {
         std::mem::take(&mut self.list)
     }
@@ -96,7 +96,7 @@ impl Rules {
         self.match_patterns(0, names, step);
     }
 
-    /// Compiles the rules for names that have turned up since.
+    /// Compiles the rules for names that are new since the last call.
     pub(super) fn sync(&mut self, names: &Names) {
         let old = self.of_name.len();
         self.of_name.resize_with(names.len(), OfName::default);
@@ -139,13 +139,13 @@ impl Rules {
         }
     }
 
-    /// Whether a rule speaks of this name at all: (with a plain partner, with a pattern).
+    /// Whether any rule matches this name: (a plain rule, a rule with a pattern).
     pub(super) fn speaks_of(&self, name: NameId) -> (bool, bool) {
         let of_name = &self.of_name[name.index()];
         (!of_name.exact.is_empty(), !of_name.sided.is_empty())
     }
 
-    /// Whether any rule says how near its pairs are reported.
+    /// Whether any rule sets `report_within_m`.
     pub(super) fn any_report(&self) -> bool {
         self.any_report
     }
@@ -174,7 +174,7 @@ impl Rules {
         self.list.get(rule).map(|r| (rule, r))
     }
 
-    /// The pattern rules that speak of a name.
+    /// The pattern rules that match a name.
     pub(super) fn sided_of(&self, name: NameId) -> &[(u32, u8)] {
         &self.of_name[name.index()].sided
     }
@@ -193,13 +193,13 @@ pub(super) fn has_pattern(rule: &PairRule) -> bool {
     is_pattern(&rule.a) || is_pattern(&rule.b)
 }
 
-/// The sides of the rule on which a name stands.
+/// The sides of the rule that a name matches.
 pub(super) fn sides_of(rule: &PairRule, text: &str) -> u8 {
     let side = |pattern: &str, bit: u8| if matches(pattern, text) { bit } else { 0 };
     side(&rule.a, SIDE_A) | side(&rule.b, SIDE_B)
 }
 
-/// Whether two names on these sides are a pair of the rule.
+/// Whether two names that match these sides are a pair of the rule.
 fn sides_meet(one: u8, other: u8) -> bool {
     (one & SIDE_A != 0 && other & SIDE_B != 0) || (one & SIDE_B != 0 && other & SIDE_A != 0)
 }
@@ -209,7 +209,7 @@ pub(super) fn ignores(rule: &PairRule) -> bool {
     rule.action == PairAction::Ignore
 }
 
-/// Sorts the rules of one name by the other name; of one pair the last stays.
+/// Sorts the plain rules of one name by the other name; for each pair only the last rule is kept.
 fn keep_last(exact: &mut Vec<(u32, u32)>) {
     exact.sort_unstable();
     exact.dedup_by(|later, kept| {
