@@ -1,7 +1,7 @@
-//! Ages: which bodies have become too old, how far stale ones may have got, and when the next one is due.
+//! Ages: bodies that have become too old, the growing reach of stale ones, and the next time-out.
 //!
-//! In: the time on `CLOCK_BOOTTIME`, which runs on while the machine is suspended. Out: bodies settled anew, the
-//! nearest time-out, the oldest and newest stamp in use.
+//! In: the time of `CLOCK_BOOTTIME`, which goes on while the machine is suspended. Out: bodies settled again, the next
+//! time-out, the oldest and newest stamp in use.
 
 use super::World;
 use super::body::Body;
@@ -13,17 +13,17 @@ use crate::ids::{BodySlot, SourceSlot, small};
 
 /// No deadline, no stamp.
 const NONE: u64 = u64::MAX;
-/// Bodies of a block: four lines of memory.
+/// Bodies per block: four cache lines.
 const BLOCK: usize = 16;
 
-/// Deadlines and stamps by slot, and the ends of each block of them: a tick looks at the blocks in which one was set,
-/// and at the ends of all.
+/// Deadlines and stamps by slot, and the extremes of each block of slots: a tick scans the blocks in which one was set,
+/// and the extremes of all blocks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ages {
     list: Vec<Age>,
     /// By block.
     ends: Vec<Ends>,
-    /// Blocks in which one was set since the last sweep, and by block whether it is one of them.
+    /// Blocks in which one was set since the last sweep, and a flag by block.
     dirty: Vec<u32>,
     is_dirty: Vec<bool>,
     all: Ends,
@@ -47,12 +47,12 @@ impl Age {
 struct Ends {
     next_ns: u64,
     oldest_ns: u64,
-    /// One more than the newest; 0: no stamp.
+    /// The newest stamp plus one; 0: no stamp.
     newest_ns: u64,
 }
 
 impl Default for Ends {
-    /// Of nobody.
+    /// Of no body.
     fn default() -> Self {
         Self {
             next_ns: NONE,
@@ -67,7 +67,7 @@ impl Ends {
         ages.iter().fold(Self::default(), |ends, age| Self {
             next_ns: ends.next_ns.min(age.deadline_ns),
             oldest_ns: ends.oldest_ns.min(age.stamp_ns),
-            // No stamp wraps to 0: it is newer than nothing.
+            // Without a stamp this wraps to 0.
             newest_ns: ends.newest_ns.max(age.stamp_ns.wrapping_add(1)),
         })
     }
@@ -93,19 +93,19 @@ impl Ages {
     pub(super) fn set(&mut self, slot: BodySlot, deadline_ns: Option<u64>, stamp_ns: Option<u64>) {
         *self.at(slot) = Age {
             deadline_ns: deadline_ns.unwrap_or(NONE),
-            // A sender that does not stamp says 0, which is older than any time.
+            // 0 means that the sender gives no stamp; it counts as older than any time.
             stamp_ns: stamp_ns
                 .filter(|s| *s != 0)
                 .map_or(NONE, |s| s.min(NONE - 1)),
         };
     }
 
-    /// Whatever its deadline was, it is now.
+    /// Makes a body due now, whatever its deadline was.
     fn set_due(&mut self, slot: BodySlot) {
         self.at(slot).deadline_ns = 0;
     }
 
-    /// An age that is to be set.
+    /// The age of a slot, to be set; its block is marked.
     fn at(&mut self, slot: BodySlot) -> &mut Age {
         let block = slot.index() / BLOCK;
         if !std::mem::replace(&mut self.is_dirty[block], true) {
@@ -114,7 +114,7 @@ impl Ages {
         &mut self.list[slot.index()]
     }
 
-    /// The first slot from `from` on whose deadline is reached, as of the last sweep.
+    /// The first slot from `from` on whose deadline has passed, as of the last sweep.
     fn next_due(&self, from: usize, now_ns: u64) -> Option<BodySlot> {
         let first = from / BLOCK;
         let blocks = self.ends.iter().enumerate().skip(first);
@@ -141,7 +141,7 @@ impl Ages {
         (self.all.next_ns != NONE).then_some(self.all.next_ns)
     }
 
-    /// Brings deadlines and stamps up to what was set.
+    /// Updates the extremes of blocks in which an age was set.
     fn sweep(&mut self) {
         if self.dirty.is_empty() {
             return;
@@ -156,7 +156,7 @@ impl Ages {
         self.all = self.ends.iter().fold(of_nobody, Ends::of_both);
     }
 
-    /// Whether the ends are those of what was set.
+    /// Structure check: whether the extremes agree with deadlines and stamps.
     pub(super) fn are_whole(&self) -> bool {
         let mut blocks = self.list.chunks(BLOCK).zip(&self.ends).enumerate();
         blocks.all(|(at, (ages, ends))| self.is_dirty[at] || Ends::of(ages) == *ends)
@@ -165,15 +165,14 @@ impl Ages {
 }
 
 impl World {
-    /// Sets the time-out of a source: from the next tick on it is what every age is judged by, also of what was sent
-    /// before.
+    /// Sets the time-out of a source. From the next tick on it applies to all of its ages, also of poses sent before.
     pub fn set_timeout(&mut self, source: usize, timeout_ns: u64) {
         if let Some(source) = self.sources.get_mut(source) {
             source.next_timeout_ns = Some(timeout_ns);
         }
     }
 
-    /// A tick begins with the time-outs that were set since the last: whom one concerns [`World::age`] judges anew.
+    /// Applies the time-outs that were set since the last tick: [`World::age`] judges the bodies concerned again.
     pub(super) fn take_timeouts(&mut self) {
         for (place, state) in self.sources.iter_mut().enumerate() {
             let Some(timeout_ns) = state.next_timeout_ns.take() else {
@@ -189,8 +188,8 @@ impl World {
         }
     }
 
-    /// Judges every age at `now_boot_ns` and closes the tick's change set: frames that waited, bodies too old, the
-    /// growing reach of stale ones, attached bodies, what edits mean for the filters.
+    /// Judges every age at `now_boot_ns` and completes the change set of the tick: waiting frames, bodies too old, the
+    /// growing reach of stale ones, attached bodies, and the filters after edits.
     pub fn age(&mut self, now_boot_ns: u64) {
         self.now_ns = self.now_ns.max(now_boot_ns);
         for place in 0..self.sources.len() {
@@ -212,8 +211,8 @@ impl World {
         self.count_frames();
     }
 
-    /// When the next body, source or waiting frame reaches its time-out, nanoseconds of `CLOCK_BOOTTIME`; `None`: none
-    /// will. As of [`World::age`].
+    /// Time of the next time-out of a body, source or waiting frame, nanoseconds of `CLOCK_BOOTTIME`; `None`: none. As
+    /// of [`World::age`].
     #[must_use]
     pub fn next_timeout(&self) -> Option<u64> {
         let sources = self
@@ -231,7 +230,7 @@ impl World {
         }
     }
 
-    /// Stale bodies get farther with every tick; those that are stale no more leave the list.
+    /// Settles stale bodies, whose reach grows with every tick; bodies that are no longer stale leave the list.
     fn grow_reaches(&mut self) {
         let mut growing = std::mem::take(&mut self.growing);
         growing.retain(|&slot| {
@@ -244,7 +243,7 @@ impl World {
         self.growing = growing;
     }
 
-    /// Gives a body another velocity; whether it is another one.
+    /// Sets the velocity of a body; returns whether it changed.
     pub(super) fn take_velocity(&mut self, slot: BodySlot, velocity: Option<Twist>) -> bool {
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return false;
@@ -257,20 +256,20 @@ impl World {
         body.source.and_then(|s| self.sources.get(s.index()))
     }
 
-    /// The time-out of a body's source, and of the one that its pose is from; none for a body without one, which cannot
-    /// move.
+    /// The shorter time-out of the body's source and of the source of its pose; none for a body without a source, which
+    /// cannot move.
     pub(super) fn timeout_of(&self, body: &Body) -> u64 {
         let own_ns = self.source_of(body).map_or(u64::MAX, |s| s.timeout_ns);
         own_ns.min(body.lent_timeout_ns)
     }
 
-    /// Whether a body that hangs on no other is too old at a time, whatever happens to it then.
+    /// Whether a body that is not attached is too old at a time, whatever its `on_stale`.
     pub(super) fn is_too_old(&self, body: &Body, now_ns: u64) -> bool {
         let age_ns = now_ns.saturating_sub(body.since_ns.unwrap_or_default());
         age_ns >= self.timeout_of(body)
     }
 
-    /// What happens to a body that is too old, as it or its source says.
+    /// `on_stale` of a body, or else of its source.
     pub(super) fn on_stale_of(&self, body: &Body) -> OnStale {
         let of_source = self.source_of(body).map(|s| s.on_stale);
         body.on_stale.or(of_source).unwrap_or_default()

@@ -1,7 +1,7 @@
 //! Scene edits at run time: put, remove, enable, filter, margins, rules, attach, reset.
 //!
-//! In: one request, a list of [`Edit`]s with shapes already built. Out: all of it done and a new scene revision, or
-//! nothing done and a text that says what to change. An edit allocates; a tick without one does not.
+//! In: one request, a list of [`Edit`]s with shapes already built. Out: either all edits applied and a new scene
+//! revision, or none applied and a text that says what to change. Edits allocate; a tick without edits does not.
 
 use std::sync::Arc;
 
@@ -23,46 +23,46 @@ pub type Edit = scene::Edit<Put>;
 /// A body to be put.
 #[derive(Clone, Debug)]
 pub struct Put {
-    /// What it is; id 0: the one its name had in this boot, or the least that is free and that no put of the request
-    /// asks for.
+    /// The body. Id 0: the id that its name had in this boot, or else the least one that is free and not asked for by
+    /// the request.
     pub body: Arc<BodySpec>,
     /// Its built shapes, in the order of `body.shapes`.
     pub shapes: Parts,
 }
 
-/// What a request did.
+/// Result of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Applied {
-    /// Scene revision from which on it holds.
+    /// Scene revision from which on the request applies.
     pub scene_rev: u64,
     /// Whether anything changed.
     pub changed: bool,
 }
 
-/// What has to be done once for a request, after its last edit.
+/// Work that is done once per request, after its last edit.
 #[derive(Clone, Debug, Default)]
 struct After {
     changed: bool,
     links: bool,
     uncounted: Uncounted,
-    /// Slots that another body is in, or none, than before; any number of times.
+    /// Slots whose body was replaced, added or removed; may contain duplicates.
     slots: Vec<BodySlot>,
-    /// Bodies that were hung on another or let go.
+    /// Bodies that were attached or detached.
     hung: Vec<BodySlot>,
-    /// Slots of bodies that were enabled or disabled, any number of times; some may be empty by now.
+    /// Slots of bodies that were enabled or disabled; may contain duplicates and slots that are empty by now.
     enabled: Vec<BodySlot>,
-    /// Where bodies are by now.
+    /// Places of bodies after the edits so far.
     places: Places,
 }
 
 impl After {
-    /// A body hangs on another one, or on none, than before.
+    /// Records a body whose attachment changed.
     pub(super) fn take_hung(&mut self, slot: BodySlot) {
         self.hung.push(slot);
         self.links = true;
     }
 
-    /// Another body is in a slot, or none.
+    /// Records a slot whose body was replaced, added or removed.
     fn take_slot(&mut self, slot: BodySlot) {
         self.slots.push(slot);
         self.links = true;
@@ -74,14 +74,14 @@ impl World {
     /// Applies one request: all of its edits in their order, or none.
     ///
     /// # Errors
-    /// A text for the user: which edit names what, and what to change. Then nothing of the request was applied.
+    /// A text for the user: which edit is wrong, and what to change. Then nothing of the request was applied.
     pub fn apply(&mut self, edits: &[Edit]) -> Result<Applied, String> {
         self.apply_stepwise(edits, &mut || {})
     }
 
     /// As [`World::apply`].
     ///
-    /// * `step` - called after each edit that was looked at, and each that was applied.
+    /// * `step` - called after each edit that was checked, and each that was applied.
     ///
     /// # Errors
     /// As [`World::apply`].
@@ -94,7 +94,7 @@ impl World {
         Ok(self.apply_checked(edits, step))
     }
 
-    /// Applies edits that [`World::check`] let pass.
+    /// Applies edits that [`World::check`] accepted.
     pub(super) fn apply_checked(&mut self, edits: &[Edit], step: &mut dyn FnMut()) -> Applied {
         let mut after = After::default();
         self.reserve_ids(edits);
@@ -125,7 +125,7 @@ impl World {
         }
     }
 
-    /// Ids that the request asks for are given to no other name of it.
+    /// Claims the ids that the request asks for, so that no other name of it gets them.
     fn reserve_ids(&mut self, edits: &[Edit]) {
         for edit in edits {
             if let Edit::Put(Put { body, .. }) = edit
@@ -147,7 +147,7 @@ impl World {
                 name,
                 report_within_m,
             } => self.set_margins(name.as_deref(), *report_within_m),
-            // All at once, behind the last edit.
+            // All at once, after the last edit.
             Edit::Rule(_) | Edit::DropRules { .. } => false,
             Edit::Attach { name, to, pose } => {
                 let attached = self.attach(name, to.as_deref(), pose.as_ref(), &mut after.places);
@@ -177,7 +177,7 @@ impl World {
         }
     }
 
-    /// Puts a body, unless the very same is there.
+    /// Puts a body, unless an identical one exists.
     fn put(&mut self, spec: &Arc<BodySpec>, shapes: &Parts, after: &mut After) -> bool {
         let known = self.names.find_name(&spec.name).and_then(|n| n.slot);
         if let Some(slot) = known {
@@ -247,9 +247,9 @@ impl World {
         slot
     }
 
-    /// Brings the lists of bodies in line with what these slots hold.
+    /// Updates the lists of bodies after changes of these slots.
     ///
-    /// * `slots` - comes out sorted, each once.
+    /// * `slots` - is sorted, and duplicates are removed.
     ///
     /// Cost: O(listed bodies), and sorting the slots.
     fn relist(&mut self, slots: &mut Vec<BodySlot>) {
@@ -282,11 +282,11 @@ impl World {
             }
             self.order.push((body.id, slot));
         }
-        // All but the end is in order: that costs a walk.
+        // Only the end is out of order, so the sort is cheap.
         self.order.sort();
     }
 
-    /// Takes a slot's body out of everything but the names and the lists of bodies.
+    /// Removes a slot's body from all structures except the names and the lists of bodies.
     fn clear_slot(&mut self, slot: BodySlot, cause: EndCause) {
         let Some(body) = self.bodies[slot.index()].take() else {
             return;
@@ -316,7 +316,7 @@ impl World {
         true
     }
 
-    /// Enables or disables a body, which is settled behind the last edit: what is undone until then was never there.
+    /// Enables or disables a body. It is settled after the last edit, so a change that is undone by then has no effect.
     fn enable(&mut self, name: &str, enabled: bool, slots: &mut Vec<BodySlot>) -> bool {
         let Some(slot) = self.slot_named(name) else {
             return false;
@@ -349,7 +349,7 @@ impl World {
         true
     }
 
-    /// Has a body's pairs found again, where it is in the broad phase.
+    /// Requests a new search for a body's pairs, if it is in the broad phase.
     pub(super) fn requery(&mut self, slot: BodySlot) {
         if self.body(slot).is_some_and(|body| body.in_broad) {
             self.lists.requery(slot);

@@ -1,6 +1,6 @@
-//! Looks at a whole request before any of it is applied, so that it succeeds or fails as one.
+//! Checks a whole request before any of it is applied, so that it succeeds or fails as a unit.
 //!
-//! In: edits in their order. Out: nothing, or a text that says which edit, what is wrong and what to change.
+//! In: edits in order. Out: nothing, or a text that says which edit is wrong, why, and what to change.
 
 mod links;
 mod rules;
@@ -21,25 +21,25 @@ use crate::scene::BodySpec;
 use crate::wire::BODY_NAME_LEN;
 use links::Sketch;
 
-/// Most names of bodies, and of rigid groups, in a boot: each is kept, because an id stays with its name.
+/// Most names of bodies and rigid groups in a boot: all are kept, because an id stays with its name.
 const NAMES_MAX: usize = 1 << 22;
 
-/// The scene as it would be after the edits looked at so far, where they change it.
+/// Changes of the scene by the edits checked so far.
 struct Draft<'a> {
     world: &'a World,
-    /// Bodies that the request puts, hangs, lets go or removes (`None`).
+    /// Bodies that the request puts, attaches, detaches or removes (`None`).
     bodies: BTreeMap<&'a str, Option<Sketch<'a>>>,
-    /// Whether the place of bodies is known; without those of which it may be otherwise by now.
+    /// Whether the place of a body is known: a cache, without bodies for which it may have changed.
     placed: Chain<&'a str, bool>,
-    /// What the request makes of bodies beside where they are.
+    /// Changes of bodies by the request, except of their places.
     touched: BTreeMap<&'a str, Touch>,
-    /// How near the pairs of all bodies are told, as of `Touch`, but for those told of since.
+    /// The last `report_within_m` set for all bodies, as in `Touch`; bodies with a later one of their own override it.
     all_within_m: Option<Option<f64>>,
-    /// Number of the edit that is looked at, from 1 on.
+    /// Number of the edit that is being checked, from 1 on.
     at: usize,
     /// Number of the last edit that forgot the poses of a source's bodies, by source; 0: none did.
     forgotten: Vec<usize>,
-    /// Ids that the request asks for, and for which name; they stay with it, also where its body goes again.
+    /// Ids that the request asks for, and their names; a name keeps its id even if its body is removed again.
     ids: BTreeMap<BodyId, &'a str>,
     /// The same by name.
     asked: BTreeMap<&'a str, BodyId>,
@@ -49,7 +49,7 @@ struct Draft<'a> {
     matched: BTreeSet<&'a str>,
 }
 
-/// Whether a distance can be one that pairs are told as near within.
+/// Checks a value of `report_within_m`.
 fn is_margin(report_within_m: Option<f64>) -> Result<(), String> {
     match report_within_m {
         Some(metres) if !(0.0..=EXTENT_MAX_M).contains(&metres) => Err(format!(
@@ -62,7 +62,7 @@ fn is_margin(report_within_m: Option<f64>) -> Result<(), String> {
 impl World {
     /// Whether a request can be applied as a whole.
     ///
-    /// * `numbered` - whether errors say which edit it is.
+    /// * `numbered` - whether errors give the number of the edit.
     /// * `step` - called after each edit, and for each rule with a pattern.
     pub(super) fn check(
         &self,
@@ -106,7 +106,7 @@ impl<'a> Draft<'a> {
             Edit::Put(Put { body, shapes }) => {
                 bends_as_said(body, shapes)?;
                 self.look_at_put(body, shapes.len())?;
-                // The same again is nothing: where it is stays known as well as it was.
+                // A repeated put changes nothing, nor how well the place is known.
                 if !self.is_there(body, shapes) {
                     self.bodies
                         .insert(&body.name, Some(Sketch::of_put(body, self.at)));
@@ -164,11 +164,12 @@ impl<'a> Draft<'a> {
         is_margin(report_within_m)
     }
 
-    /// Whether the very body that is put is there at this point of the request.
+    /// Whether an identical body exists at this point of the request.
     fn is_there(&self, spec: &BodySpec, shapes: &[PlacedShape]) -> bool {
         let name = &*spec.name;
         let sketch = self.bodies.get(name);
-        // What hangs elsewhere by now is taken for another: what it hangs on says where it is, or its start pose does.
+        // A body whose attachment the request changed counts as different: its place follows from another body, or from
+        // its start pose.
         let is_other = |s: &Option<Sketch<'_>>| s.is_none_or(|s| s.is_put || s.hangs.is_some());
         let slot = self.world.slot_named(name);
         let Some(slot) = slot.filter(|_| !sketch.is_some_and(is_other)) else {
@@ -199,7 +200,7 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
-    /// Whether a body is there at this point of the request.
+    /// Whether a body exists at this point of the request.
     fn has(&self, name: &str) -> bool {
         match self.bodies.get(name) {
             Some(body) => body.is_some(),
@@ -220,7 +221,7 @@ impl<'a> Draft<'a> {
             .ok_or_else(|| self.no_body(name, "put the body first"))
     }
 
-    /// That no body has a name, and what to change: the name, or else.
+    /// Error text: no body has this name, with the nearest name as a hint.
     fn no_body(&self, name: &str, or_else: &str) -> String {
         let meant = self.world.name_meant(name).filter(|meant| self.has(meant));
         let mend = match meant {

@@ -1,6 +1,6 @@
-//! Attached bodies: which body each hangs on in the end, and at which pose.
+//! Attachments: the root of each attached body, and its pose relative to the root.
 //!
-//! In: attachments by name, after an edit. Out: roots and root poses, and each body settled whose root is another now.
+//! In: attachments by name, after an edit. Out: roots and root poses; each body whose root changed is settled.
 
 use std::collections::BTreeMap;
 
@@ -11,17 +11,17 @@ use super::filters::MOVES;
 use crate::ids::{BodySlot, SourceSlot};
 use crate::math::{Pose, relative};
 
-/// Where bodies are after the edits of a request so far, as far as that was asked.
+/// Places of bodies after the edits of a request so far, as far as they were asked for.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Places {
-    /// Whether some may be elsewhere than before the request.
+    /// Whether the request may have moved any body.
     any_moved: bool,
-    /// The root of bodies that hang on others, and their pose there.
+    /// Roots of attached bodies, and their poses relative to them.
     roots: Chain<BodySlot, (BodySlot, Pose)>,
 }
 
 impl Places {
-    /// Bodies may be elsewhere by now.
+    /// Forgets all roots: bodies may have moved.
     pub(super) fn forget(&mut self) {
         self.any_moved = true;
         self.roots.clear();
@@ -29,7 +29,7 @@ impl Places {
 }
 
 impl World {
-    /// Hangs a body on another, or lets it go; [`World::link`] does the rest.
+    /// Attaches a body to another, or detaches it; [`World::link`] updates the roots.
     pub(super) fn attach(
         &mut self,
         name: &str,
@@ -61,9 +61,9 @@ impl World {
         true
     }
 
-    /// Where a body is after the edits so far. Where what it hung on is gone: where it was before them.
+    /// The pose of a body after the edits so far; if its root was removed, the pose before them.
     ///
-    /// Cost: that of its root, where the request moved any.
+    /// Cost: that of finding its root, if the request moved any body.
     fn by_now(&self, slot: BodySlot, places: &mut Places) -> Pose {
         let pose = |slot| {
             self.body(slot)
@@ -76,9 +76,9 @@ impl World {
         pose(top) * local
     }
 
-    /// The body that one hangs on in the end after the edits so far, and its pose there.
+    /// The root of a body after the edits so far, and its pose relative to it.
     ///
-    /// Cost: the bodies above it; each of them once, until it hangs elsewhere.
+    /// Cost: O(bodies between it and its root), each only once until its attachment changes.
     fn root_by_now(&self, slot: BodySlot, places: &mut Places) -> (BodySlot, Pose) {
         let root = self.root_among(slot, &mut places.roots.known);
         let mut at = slot;
@@ -90,7 +90,7 @@ impl World {
         root
     }
 
-    /// It stays where it is, as old and as well known as it was; from now on its own source speaks for it.
+    /// Detaches a body: it keeps its place, age and status; from now on its own source moves it.
     fn detach(&mut self, slot: BodySlot, pose: Option<&Pose>, places: &mut Places) -> bool {
         if self.entries[slot.index()].attach.is_none() {
             return false;
@@ -98,7 +98,7 @@ impl World {
         let by_now = self.by_now(slot, places);
         let (root, _) = self.root_by_now(slot, places);
         let of_root = &self.entries[root.index()];
-        // Else what it hung on is gone, and with it who says where it is.
+        // Otherwise the root was removed, and the place is no longer known.
         let is_root = of_root.attach.is_none();
         let root_body = self.body(root);
         let bent = root_body.and_then(|body| body.vertices.as_deref());
@@ -118,28 +118,28 @@ impl World {
         entry.has_pose = has_pose || !moves;
         entry.refused = refused && moves;
         entry.raw = [f64::NAN; 7];
-        // Where it is was said by another: no pause of its own source speaks of it.
+        // Its pose came from another source: a pause of its own source does not confirm it.
         entry.seen = 0;
         if let (Some(body), Some((age, timeout_ns))) = (self.bodies[slot.index()].as_mut(), age) {
             (body.stamp_ns, body.since_ns, body.received_ns, body.reject) = age;
             body.lent_timeout_ns = if moves { timeout_ns } else { u64::MAX };
             if !root_moves {
-                // Until now its place was beyond doubt.
+                // It was attached to a body that cannot move: its age starts now.
                 body.since_ns = Some(now_ns);
             }
         }
-        // At once: edits that follow find it on its own.
+        // At once, since later edits of the request need it.
         self.take_root(slot, (slot, Pose::identity()));
         let told = pose.filter(|_| !moves);
         let was_in = self.body(slot).is_some_and(|body| body.in_broad);
-        // What moved it does no more, and its own source has not said how it goes.
+        // Its former root no longer moves it, and its own source has not sent a velocity yet.
         let other_speed = self.take_velocity(slot, None);
         let moved = self.place(slot, told.unwrap_or(&by_now));
         if moved {
             self.forget_way(slot);
         }
-        // Also where it was: another says how well that is known, and `take_root` sees no change where the request hung
-        // it there.
+        // Also if it did not move: its status may have changed, and `take_root` sees no change if the request itself
+        // had attached it.
         self.settle(slot, moved);
         if other_speed && !moved && was_in {
             self.lists.restated(slot);
@@ -148,8 +148,8 @@ impl World {
         true
     }
 
-    /// Finds anew the roots of these bodies and of all that hang on others, and settles those whose root, pose or
-    /// freedom to move changed. Any other body is its own root, as it was.
+    /// Finds the roots of these bodies and of all attached ones again, and settles those whose root, pose or mobility
+    /// changed. Any other body stays its own root.
     ///
     /// Cost: O(n log n) of these and the attached bodies.
     pub(super) fn link<'a>(&mut self, edited: impl Iterator<Item = &'a BodySlot>) {
@@ -169,7 +169,7 @@ impl World {
             self.take_root(slot, root);
         }
         self.link_paths();
-        // Their roots are settled now.
+        // After their roots have been settled.
         for slot in &attached {
             self.entries[slot.index()].touched = self.tick;
         }
@@ -179,8 +179,7 @@ impl World {
         self.settle_attached();
     }
 
-    /// Takes down which body one hangs on in the end and its pose there, and settles it where that, or its freedom to
-    /// move, is another now.
+    /// Sets the root of a body and its pose relative to it, and settles the body if that, or its mobility, changed.
     fn take_root(&mut self, slot: BodySlot, (root, root_pose): (BodySlot, Pose)) {
         let entry = &mut self.entries[slot.index()];
         let rooted = entry.root == root && entry.root_pose == root_pose;
@@ -196,38 +195,38 @@ impl World {
         }
         self.requery(slot);
         if moves_changed && self.body(slot).is_some_and(|body| body.unbounded) {
-            // What its certificates say of its motion was said by another rule.
+            // Its certificates counted its motion by another rule.
             self.begin_anew(slot);
         }
     }
 
-    /// What a body hangs on, if that is there, and its pose there.
+    /// The body that this one is attached to, if it exists, and the relative pose.
     pub(super) fn hold_of(&self, slot: BodySlot) -> Option<(BodySlot, Pose)> {
         let (to, local) = self.entries[slot.index()].attach?;
         Some((self.names.get(to).slot?, local))
     }
 
-    /// The bodies that one hangs on, the nearest first, each with its pose seen from there.
+    /// The chain of bodies that this one is attached to, nearest first, each with its pose relative to it.
     pub(super) fn above(&self, slot: BodySlot) -> impl Iterator<Item = (BodySlot, Pose)> + '_ {
         let first = Some((slot, Pose::identity()));
         let next = |(at, pose): &(BodySlot, Pose)| {
             let (to, local) = self.hold_of(*at)?;
             Some((to, local * pose))
         };
-        // No longer than the longest chain there can be: amid a request they may hang on each other.
+        // Bounded, since within a request attachments may form a ring.
         let walk = std::iter::successors(first, next).skip(1);
         walk.take(self.bodies.len())
     }
 
-    /// The body that one hangs on in the end, itself where on none, and its pose seen from there; each body that hangs
-    /// on another is walked over once.
+    /// The root of a body (itself without an attachment) and its pose relative to it; each attached body is visited
+    /// once.
     fn root_among(
         &self,
         slot: BodySlot,
         known: &mut BTreeMap<BodySlot, (BodySlot, Pose)>,
     ) -> (BodySlot, Pose) {
         let (mut at, mut way) = (slot, Vec::new());
-        // The check before an edit has shut out rings and loose ends.
+        // The check of the request has excluded rings and missing bodies.
         let (root, mut pose) = loop {
             if let Some(found) = known.get(&at) {
                 break *found;
@@ -247,9 +246,9 @@ impl World {
         (root, pose)
     }
 
-    /// A body moves when its root does, and by the hand of the root's source.
+    /// An attached body can move if its root can, and is moved by the root's source.
     ///
-    /// * returns - whether it may move now and could not before, or the other way round.
+    /// * returns - whether its mobility changed.
     fn take_freedom(&mut self, slot: BodySlot, root: BodySlot) -> bool {
         let Some(spec) = &self.entries[root.index()].spec else {
             return false;
@@ -264,7 +263,7 @@ impl World {
         if changed {
             self.touched.push(slot);
         }
-        // Names say whose a body is, too.
+        // The names message contains the source of a body.
         self.names_changed |= body.source != source;
         body.source = source;
         changed

@@ -1,6 +1,6 @@
-//! Whether a body that is put is the one that is there.
+//! Comparison of a put with the existing body of that name.
 //!
-//! In: what is put. Out: yes or no; a yes makes of the put an edit that changes nothing.
+//! In: the put. Out: whether they are identical; then the put changes nothing.
 
 use std::sync::Arc;
 
@@ -10,23 +10,22 @@ use super::place::same_bits;
 use crate::ids::{BodyId, BodySlot};
 use crate::scene::BodySpec;
 
-/// What edits of a request have made of a body by the time of a put, where that is looked at before any is applied;
-/// `None`: nothing.
+/// Changes of a body by the edits of a request before a put, while the request is checked; `None`: no change.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Touch {
     pub(super) enabled: Option<bool>,
     pub(super) group: Option<u32>,
     pub(super) mask: Option<u32>,
-    /// Metres; `Some(None)`: what it was put with.
+    /// Metres; `Some(None)`: the value it was put with.
     pub(super) report_within_m: Option<Option<f64>>,
-    /// It hangs on nothing by now.
+    /// Whether it has been detached.
     pub(super) is_let_go: bool,
 }
 
 impl World {
-    /// Whether a put would change nothing: the same words, the same shapes, and what edits made of it is the same.
+    /// Whether a put would change nothing: equal entries, equal shapes, and no other edit since the last put.
     ///
-    /// * `touch` - what becomes of the body before.
+    /// * `touch` - changes of the body by earlier edits of the request.
     pub(super) fn is_same(
         &self,
         slot: BodySlot,
@@ -39,9 +38,9 @@ impl World {
             return false;
         };
         let same_words = (spec.id == BodyId(0) || spec.id == body.id) && old.reads_as(spec);
-        // A file may have changed under the same name.
+        // The content of a file may have changed.
         let measures = |placed: &PlacedShape| match &body.vertices {
-            // As it was put: what its sender made of it since is no other shape.
+            // As it was put: vertices sent since then do not count.
             Some(vertices) => vertices.rest,
             None => (placed.shape.aabb, placed.shape.radius),
         };
@@ -52,7 +51,7 @@ impl World {
                 .zip(words)
                 .all(|((a, b), (was, is))| {
                     let (aabb, radius) = measures(a);
-                    // One shape has one spec, which may hold all corners of a mesh: they are not gone through again.
+                    // One built shape has one spec: that may contain all vertices of a mesh, so it is not compared.
                     let same = Arc::ptr_eq(&a.shape, &b.shape)
                         || was.shape == is.shape
                             && aabb == b.shape.aabb
@@ -63,7 +62,7 @@ impl World {
         same_words && same_shapes && self.is_as_put(slot, spec, touch)
     }
 
-    /// Whether what edits can change of a body is as it was put.
+    /// Whether no edit has changed the body since it was put.
     fn is_as_put(&self, slot: BodySlot, spec: &BodySpec, touch: &Touch) -> bool {
         let (Some(body), Some(hot)) = (self.body(slot), self.filters.bodies.get(slot.index()))
         else {

@@ -1,9 +1,9 @@
-//! Which pairs are checked, and why not the others.
+//! Filters: which pairs are checked, and the reason if not.
 //!
-//! In: masks, neighbours, rigid groups and rules, compiled when the scene changes. Out: a yes or no a pair. The common
-//! pair (no rule speaks of both bodies) costs two loads of one cache line each and a few compares. The order of what
-//! beats what: bodies that cannot be paired at all, then rules (the last that matches), then neighbours, rigid groups
-//! and attached bodies, then masks.
+//! In: masks, neighbours, rigid groups and rules, compiled when the scene changes. Out: a decision per pair. The common
+//! pair (no rule matches both bodies) costs two loads of one cache line each and a few comparisons. Precedence: bodies
+//! that can never be paired; then rules (the last that matches); then neighbours, rigid groups and attached bodies;
+//! then masks.
 
 use super::names::{NameId, Names};
 use super::rules::{Rules, ignores};
@@ -12,20 +12,20 @@ use crate::ids::{BodySlot, PairKey};
 pub(super) const LIVE: u16 = 1;
 pub(super) const ENABLED: u16 = 2;
 pub(super) const MOVES: u16 = 4;
-/// Each of its shapes is a half-space.
+/// All of its shapes are half-spaces.
 pub(super) const HALF_SPACES: u16 = 8;
 pub(super) const KEEPS: u16 = 16;
-/// It keeps its pairs, and its box, which says nothing, makes no new ones.
+/// Its box is meaningless: it keeps its pairs and makes no new ones.
 pub(super) const BARS: u16 = 128;
-/// A rule of two plain names speaks of it.
+/// A rule of two plain names matches it.
 pub(super) const EXACT: u16 = 32;
-/// A rule with a pattern speaks of it.
+/// A rule with a pattern matches it.
 pub(super) const SIDED: u16 = 64;
 
 /// No group.
 pub(super) const NO_GROUP: u32 = u32::MAX;
 
-/// Why a pair is checked or not.
+/// The reason why a pair is checked or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Because {
     /// The masks allow it: checked.
@@ -34,19 +34,19 @@ pub enum Because {
     CheckRule,
     /// An `ignore` rule.
     IgnoreRule,
-    /// The one is the other's parent.
+    /// One is the parent of the other.
     Neighbours,
     /// Both are in one rigid group.
     RigidGroup,
-    /// Both hang on one body.
+    /// Both are attached to the same body.
     Attached,
     /// The masks do not allow it.
     MasksIgnore,
     /// Neither can move.
     CannotMove,
-    /// Both are half-spaces and nothing else.
+    /// Both consist of half-spaces only.
     HalfSpaces,
-    /// A body is disabled, or not there.
+    /// A body is disabled or does not exist.
     Disabled,
 }
 
@@ -57,7 +57,7 @@ impl Because {
         matches!(self, Self::Masks | Self::CheckRule)
     }
 
-    /// Whether it counts as an ignored pair: a rule, neighbour, rigid group or attachment says so.
+    /// Whether it counts as an ignored pair: because of a rule, neighbour, rigid group or attachment.
     #[must_use]
     pub fn is_ignored(self) -> bool {
         matches!(
@@ -66,7 +66,7 @@ impl Because {
         )
     }
 
-    /// The word for people.
+    /// The word shown to users.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -84,7 +84,7 @@ impl Because {
     }
 }
 
-/// What the filters need of one body, side by side in one cache line.
+/// Data of one body for the filters, in one cache line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hot {
     pub(super) flags: u16,
@@ -93,7 +93,7 @@ pub(super) struct Hot {
     pub(super) name: NameId,
     pub(super) parent: NameId,
     pub(super) rigid: u32,
-    /// Name of the body it hangs on in the end; its own where it hangs on none.
+    /// Name of its root; its own name without an attachment.
     pub(super) root: NameId,
     pub(super) report_within_m: f64,
 }
@@ -130,9 +130,9 @@ pub struct Filters {
     pub(super) rules: Rules,
     pub(super) ignored: u64,
     pub(super) forced: Vec<PairKey>,
-    /// Per slot: by how much a box must be widened for rules whose pairs are too many to be forced, metres.
+    /// Per slot: widening of the box for rules with too many pairs to be forced, metres.
     pub(super) margins_m: Vec<f64>,
-    /// Whether any of these is not 0.
+    /// Whether any margin is not 0.
     pub(super) any_margin: bool,
 }
 
@@ -143,7 +143,7 @@ impl Filters {
         self.decide(a, b).allows()
     }
 
-    /// Whether the body's box says nothing, because its place is not known and its reach has no bound.
+    /// Whether the body's box is meaningless, because its place is unknown and its reach is unbounded.
     #[must_use]
     pub fn keeps(&self, slot: BodySlot) -> bool {
         self.bodies
@@ -151,7 +151,7 @@ impl Filters {
             .is_some_and(|hot| hot.has(KEEPS))
     }
 
-    /// Whether it does so, and its box makes no pairs in this tick either.
+    /// Whether that is so and its box makes no pairs in this tick either.
     #[must_use]
     pub fn bars(&self, slot: BodySlot) -> bool {
         self.bodies
@@ -159,7 +159,7 @@ impl Filters {
             .is_some_and(|hot| hot.has(BARS))
     }
 
-    /// Whether a pair is checked, and why.
+    /// Whether a pair is checked, and the reason.
     #[must_use]
     pub fn decide(&self, a: BodySlot, b: BodySlot) -> Because {
         let (Some(hot_a), Some(hot_b)) = (self.bodies.get(a.index()), self.bodies.get(b.index()))
@@ -181,7 +181,7 @@ impl Filters {
         by_default(hot_a, hot_b)
     }
 
-    /// As [`Filters::decide`], as if both were enabled: what [`Filters::ignored_pairs_count`] counts.
+    /// As [`Filters::decide`], but as if both were enabled, as [`Filters::ignored_pairs_count`] counts.
     #[must_use]
     pub fn decide_if_enabled(&self, a: BodySlot, b: BodySlot) -> Because {
         match (self.bodies.get(a.index()), self.bodies.get(b.index())) {
@@ -192,21 +192,22 @@ impl Filters {
         }
     }
 
-    /// Whether what is no body of the scene, of this group and mask, is checked with a body: by the masks alone.
+    /// Whether a query shape of this group and mask, which is no body of the scene, is checked with a body: only the
+    /// masks decide.
     #[must_use]
     pub fn allows_stranger(&self, group: u32, mask: u32, slot: BodySlot) -> bool {
         let hot = self.bodies.get(slot.index()).unwrap_or(&Hot::GONE);
         hot.has(LIVE) && hot.has(ENABLED) && group & hot.mask != 0 && hot.group & mask != 0
     }
 
-    /// Whether a body is of one of these groups; of all groups is each, also one that is of none.
+    /// Whether a body is in one of these groups; if all groups are given, every body is.
     #[must_use]
     pub fn is_of(&self, groups: u32, slot: BodySlot) -> bool {
         let hot = self.bodies.get(slot.index()).unwrap_or(&Hot::GONE);
         hot.has(LIVE) && (hot.group & groups != 0 || groups == u32::MAX)
     }
 
-    /// The reason text of the rule that decides a pair; `None` where none does.
+    /// The reason text of the rule that decides a pair; `None`: no rule does.
     #[must_use]
     pub fn rule_reason(&self, a: BodySlot, b: BodySlot) -> Option<&str> {
         let (hot_a, hot_b) = (self.bodies.get(a.index())?, self.bodies.get(b.index())?);
@@ -217,7 +218,7 @@ impl Filters {
         Some(&rule.reason)
     }
 
-    /// Below which gap a pair is reported, metres: the larger of its bodies' values; a rule's value overrides it.
+    /// Gap below which a pair is reported, metres: the larger of its bodies' values, unless a rule overrides it.
     #[must_use]
     pub fn report_within(&self, a: BodySlot, b: BodySlot) -> f64 {
         let (Some(hot_a), Some(hot_b)) = (self.bodies.get(a.index()), self.bodies.get(b.index()))
@@ -234,26 +235,26 @@ impl Filters {
         hot_a.report_within_m.max(hot_b.report_within_m)
     }
 
-    /// Pairs that are candidates at any distance, because a rule reports them farther than their boxes are widened.
+    /// Pairs that are candidates at any distance, because a rule reports them beyond the widening of their boxes.
     /// Sorted; only allowed pairs; their bodies may be out of the broad phase.
     #[must_use]
     pub fn forced_pairs(&self) -> &[PairKey] {
         &self.forced
     }
 
-    /// How many pairs a rule, neighbour, rigid group or attachment ignores.
+    /// Number of pairs that are ignored by a rule, neighbour, rigid group or attachment.
     #[must_use]
     pub fn ignored_pairs_count(&self) -> u64 {
         self.ignored
     }
 
-    /// How many rules of pairs there are.
+    /// Number of pair rules.
     #[must_use]
     pub fn rules_count(&self) -> usize {
         self.rules.list().len()
     }
 
-    /// Marks what the rules say of a slot's name, after the rules or the slot changed.
+    /// Updates the flags of a slot by the rules that match its name, after the rules or the slot changed.
     pub(super) fn mark_ruled(&mut self, slot: usize) {
         let hot = &mut self.bodies[slot];
         hot.flags &= !(EXACT | SIDED);
@@ -269,7 +270,7 @@ impl Filters {
     }
 }
 
-/// What no rule can change.
+/// The decisions that no rule can change.
 pub(super) fn never(a: &Hot, b: &Hot) -> Option<Because> {
     if (a.flags | b.flags) & MOVES == 0 {
         return Some(Because::CannotMove);
@@ -277,7 +278,7 @@ pub(super) fn never(a: &Hot, b: &Hot) -> Option<Because> {
     (a.flags & b.flags & HALF_SPACES != 0).then_some(Because::HalfSpaces)
 }
 
-/// What a rule's word makes of a pair.
+/// The decision of a rule.
 pub(super) fn by_rule(ignores: bool) -> Because {
     if ignores {
         Because::IgnoreRule
@@ -286,7 +287,7 @@ pub(super) fn by_rule(ignores: bool) -> Because {
     }
 }
 
-/// What holds where no rule matches.
+/// The decision if no rule matches.
 pub(super) fn by_default(a: &Hot, b: &Hot) -> Because {
     if are_neighbours(a, b) {
         return Because::Neighbours;
@@ -294,7 +295,7 @@ pub(super) fn by_default(a: &Hot, b: &Hot) -> Because {
     by_default_of_strangers(a, b)
 }
 
-/// What holds where no rule matches and neither is the other's parent.
+/// The decision if no rule matches and neither is the other's parent.
 pub(super) fn by_default_of_strangers(a: &Hot, b: &Hot) -> Because {
     if a.rigid == b.rigid && a.rigid != NO_GROUP {
         Because::RigidGroup
@@ -307,7 +308,7 @@ pub(super) fn by_default_of_strangers(a: &Hot, b: &Hot) -> Because {
     }
 }
 
-/// Whether the one is the other's parent.
+/// Whether one is the parent of the other.
 pub(super) fn are_neighbours(a: &Hot, b: &Hot) -> bool {
     a.parent == b.name || b.parent == a.name
 }

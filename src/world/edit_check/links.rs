@@ -1,5 +1,5 @@
-//! What hangs on what, and where that is known, at each point of a request. In: one edit, at last all of them. Out:
-//! nothing, or what is wrong.
+//! Attachments and known places at each point of a request. In: one edit at a time, finally the whole request. Out:
+//! nothing, or an error text.
 
 use std::collections::BTreeSet;
 
@@ -10,22 +10,22 @@ use crate::ids::BodySlot;
 use crate::math::Pose;
 use crate::scene::BodySpec;
 
-/// A body as the edits so far make it.
+/// A body after the edits so far.
 #[derive(Clone, Copy)]
 pub(super) struct Sketch<'a> {
     pub(super) spec: &'a BodySpec,
-    /// What it hangs on.
+    /// The body that it is attached to.
     pub(super) hangs: Option<&'a str>,
-    /// Whether it is known where it is, where what it hangs on has no say in it.
+    /// Whether its place is known by itself, without the body that it is attached to.
     has_place: bool,
-    /// Number of the edit that said so; 0: it was so before the request.
+    /// Number of the edit that decided that; 0: as before the request.
     at: usize,
     /// Whether the request puts it.
     pub(super) is_put: bool,
 }
 
 impl<'a> Sketch<'a> {
-    /// One that the request puts: the start pose that is written beside the other edits counts for them.
+    /// A body that the request puts: for the other edits of the request its start pose counts as known.
     pub(super) fn of_put(spec: &'a BodySpec, at: usize) -> Self {
         Self {
             spec,
@@ -36,11 +36,11 @@ impl<'a> Sketch<'a> {
         }
     }
 
-    /// One that is there before the request.
+    /// A body that existed before the request.
     pub(super) fn of_world(world: &'a World, slot: BodySlot) -> Option<Self> {
         let entry = &world.entries[slot.index()];
         let root = &world.entries[entry.root.index()];
-        // Its last pose does not say where a body is that is too old; what hangs on another has the age of its root.
+        // The place of a body that is too old is not known; an attached body has the age of its root.
         let now_ns = world.begun_ns.max(world.now_ns);
         let root_body = world.body(entry.root);
         let is_old = root_body.is_none_or(|body| world.is_too_old(body, now_ns));
@@ -57,12 +57,12 @@ impl<'a> Sketch<'a> {
 }
 
 impl<'a> Draft<'a> {
-    /// Whether the place of a body is known well enough to hang something on it, or it on something. Cost: the bodies
-    /// above it that are not known to be placed or not.
+    /// Whether the place of a body is known well enough to attach another to it, or it to another. Cost: O(bodies
+    /// between it and its root that are not in the cache).
     fn is_placed(&mut self, name: &'a str) -> bool {
         let mut at = name;
         let mut way = Vec::new();
-        // No longer than the longest chain there can be: they may hang on each other by now.
+        // Bounded, since within a request attachments may form a ring.
         let is_placed = loop {
             if let Some(known) = self.placed.known.get(at) {
                 break *known;
@@ -125,7 +125,7 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
-    /// A body let go needs a place, if it cannot move, or a source.
+    /// Checks a detach: the body needs a place if it cannot move, else a source.
     fn look_at_detach(
         &mut self,
         name: &'a str,
@@ -149,7 +149,7 @@ impl<'a> Draft<'a> {
                 "it is not known where `{name}` is: wait for the frames of what it hangs on, or put it where it is"
             ));
         }
-        // Who says where it is goes with what it hung on, where that is gone.
+        // If its root was removed, its place is no longer known.
         let hangs_on_one = body.hangs.is_none_or(|to| self.has(to));
         let free = Sketch {
             hangs: None,
@@ -164,9 +164,9 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
-    /// After the last edit: parents and attachments are there, and none hangs on itself.
+    /// Checks after the last edit that parents and attachments exist, and that no attachments form a ring.
     ///
-    /// Cost: O(edits + bodies that hang on others), each a search.
+    /// Cost: O(edits + attached bodies), each a search.
     pub(super) fn references_hold(&self, edits: &[Edit]) -> Result<(), String> {
         for edit in edits {
             if let Edit::Put(Put { body, .. }) = edit
@@ -182,7 +182,7 @@ impl<'a> Draft<'a> {
         let hung = hung.filter_map(|slot| Some(&*world.body(*slot)?.name));
         let edited = self.bodies.iter();
         let edited = edited.filter(|(_, body)| body.is_some_and(|body| body.hangs.is_some()));
-        // Those above which all is well.
+        // Bodies whose chains have been checked.
         let mut held: BTreeSet<&str> = BTreeSet::new();
         for name in hung.chain(edited.map(|(name, _)| *name)) {
             self.is_held(name, &mut held)?;
@@ -190,7 +190,7 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
-    /// Whether a body, if it is there, hangs on one that hangs on none in the end.
+    /// Whether the chain of attachments of a body, if it exists, ends at a root.
     fn is_held<'b>(&'b self, name: &'b str, held: &mut BTreeSet<&'b str>) -> Result<(), String> {
         let mut at = name;
         let mut way = BTreeSet::new();

@@ -1,4 +1,4 @@
-//! Edits of pair rules, looked at before anything is applied. In: one edit. Out: nothing, or what is wrong.
+//! Checks of edits of pair rules before anything is applied. In: one edit. Out: nothing, or an error text.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use crate::scene::{PairRule, is_pattern, literal_ends, pattern_matches};
 const RULES_MAX: usize = 1 << 20;
 
 impl<'a> Draft<'a> {
-    /// Whether a body that is there at this point of the request has such a name.
+    /// Whether a body with a matching name exists at this point of the request.
     fn any_matches(&mut self, pattern: &'a str) -> bool {
         if !is_pattern(pattern) {
             return self.has(pattern);
@@ -64,7 +64,7 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
-    /// Whether the rules with patterns match few enough names in all, those included that the request brings.
+    /// Checks that the rules with patterns match few enough names in all, including the names that the request brings.
     ///
     /// * `step` - called after each such rule.
     pub(super) fn patterns_hold(&self, step: &mut dyn FnMut()) -> Result<(), String> {
@@ -73,7 +73,7 @@ impl<'a> Draft<'a> {
         let brought = brought.filter(|name| names.find_name(name).is_none());
         let mut brought: Vec<&str> = brought.collect();
         if self.rules.is_none() {
-            // Of requests of the same tick.
+            // Names of earlier requests of the same tick.
             let unmatched = names.all().get(rules.names_len()..).unwrap_or_default();
             brought.extend(unmatched.iter().map(|name| &*name.text));
             brought.sort_unstable();
@@ -88,7 +88,7 @@ impl<'a> Draft<'a> {
             None => (rules.patterned().collect(), rules.matches()),
             Some(draft) => (draft.iter().filter(|rule| has_pattern(rule)).collect(), 0),
         };
-        // Many rules have a side in common.
+        // Many rules share a side.
         let mut of_side: BTreeMap<&str, usize> = BTreeMap::new();
         for rule in those {
             for side in [&*rule.a, &*rule.b] {
@@ -118,7 +118,7 @@ impl<'a> Draft<'a> {
     }
 }
 
-/// Of names in order that begin at the pattern's literal beginning, those that it matches.
+/// The names that a pattern matches, out of sorted names from its literal beginning on.
 fn matching<'n>(
     from_head: impl Iterator<Item = &'n str>,
     pattern: &str,
