@@ -1,30 +1,30 @@
-//! Participants that DDS took as gone, while they may live: a computer that slept, a network that was down, a process
-//! that was stopped. In: who was not heard for its lease, and who is heard. Out: whether one of them is back. Pure.
+//! Participants that DDS gave up although they may be alive: a computer that slept, a network that was down, a process
+//! that was stopped. In: participants whose lease ended, and those that are heard. Out: whether one of them is back.
+//! Pure.
 //!
-//! rustdds 0.15 never takes one back that announces itself as before: it holds each announcement by its sequence
-//! number, and Fast DDS and Cyclone DDS repeat theirs with the same, so that it is passed over as a duplicate; what
-//! the participant said of its writers and readers is passed over likewise. A new node knows none of it and hears
-//! all.
+//! rustdds 0.15 never accepts a participant again that announces itself as before: it remembers announcements by
+//! sequence number, and Fast DDS and Cyclone DDS repeat theirs with the same number, so they are dropped as duplicates.
+//! The same holds for announcements of its writers and readers. A new node remembers nothing and accepts all.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Participants that are waited for: the oldest are given up for newer ones, as most of them are dead.
+/// Most lost participants that are remembered: the oldest give way to newer ones, as most of them have ended.
 const ABSENT_MAX: usize = 256;
 
-/// Who was lost and not heard since. All are told by their GUID prefixes, in hexadecimal digits.
+/// Participants that were lost and not heard since, by GUID prefix in hexadecimal digits.
 #[derive(Debug, Default)]
 pub(super) struct Absent {
     prefixes: VecDeque<String>,
-    /// Words of those that were lost since the last look.
+    /// Texts about participants that were lost since the last call of [`Self::take_lost`].
     lost: Vec<String>,
     is_back: bool,
 }
 
 impl Absent {
-    /// One was not heard for its lease.
+    /// Records a participant whose lease ended.
     pub(super) fn lose(&mut self, prefix: &str, lease: Duration) {
-        // One that DDS took back, and lost again before it was seen here, is there once.
+        // If DDS accepted it again and lost it again in between, it is listed once.
         self.part(prefix);
         if self.prefixes.len() == ABSENT_MAX {
             self.prefixes.pop_front();
@@ -36,17 +36,17 @@ impl Absent {
         ));
     }
 
-    /// One said that it leaves.
+    /// Removes a participant that announced its end.
     pub(super) fn part(&mut self, prefix: &str) {
         self.prefixes.retain(|absent| absent != prefix);
     }
 
-    /// One is heard, and known to DDS: what it said of its endpoints before is not heard again for that.
+    /// Records a participant that is heard and known to DDS; its endpoints are not announced again.
     pub(super) fn meet(&mut self, prefix: &str) {
         self.is_back |= self.prefixes.iter().any(|absent| absent == prefix);
     }
 
-    /// Those are heard, and unknown to DDS.
+    /// Records participants that are heard and unknown to DDS.
     pub(super) fn hear(&mut self, unknown: &[String]) {
         self.is_back |= unknown.iter().any(|prefix| self.prefixes.contains(prefix));
     }
@@ -56,7 +56,7 @@ impl Absent {
         self.is_back
     }
 
-    /// What to tell of those that were lost since the last call.
+    /// Texts about participants that were lost since the last call.
     pub(super) fn take_lost(&mut self) -> Vec<String> {
         std::mem::take(&mut self.lost)
     }
@@ -75,7 +75,7 @@ mod tests {
     #[test]
     fn bug_one_that_was_lost_and_announces_itself_again_is_back() {
         let mut absent = Absent::default();
-        // One that comes for the first time is unknown for a moment, too.
+        // A new participant is unknown for a moment, too.
         absent.hear(&[ONE.to_owned()]);
         absent.lose(ONE, LEASE);
         absent.hear(&[TWO.to_owned()]);

@@ -1,6 +1,6 @@
 //! The receiving thread (`ros-rx`): waits on every subscription, decodes, and puts frames and poses on the shelf.
 //!
-//! In: samples of anybody in the DDS domain. Out: frames for the tick thread, which is woken; faults in words.
+//! In: samples of any writer in the DDS domain. Out: frames for the tick thread, which is woken; texts of faults.
 
 mod early;
 mod frames;
@@ -31,26 +31,26 @@ use links::{look_at, source_name, take_links};
 pub(super) use wrong::Local;
 use wrong::Wrongs;
 
-/// Longest sleep: how soon the end, and chains that never change, are seen.
+/// Longest sleep: bounds the delay until the end of the node, and repeated poses of fixed links, are noticed.
 const SLEEP: Duration = Duration::from_nanos(SLEEP_NS);
 /// [`SLEEP`], nanoseconds.
 const SLEEP_NS: u64 = 100_000_000;
 /// Shortest sleep until a frame has waited for its names for its time-out, nanoseconds.
 const SLEEP_LEAST_NS: u64 = 5_000_000;
-/// Samples taken from one subscription in one go, so that a flooder starves nobody.
+/// Most samples taken from one subscription per round, so that one busy topic does not starve the others.
 const TAKES_MAX: usize = 256;
-/// Samples that cannot be decoded, in one go.
+/// Most undecodable samples taken per round.
 const ERRORS_MAX: usize = 64;
-/// How often faults are looked for, nanoseconds.
+/// Time between two searches for faults, nanoseconds.
 const FAULTS_NS: u64 = 500_000_000;
-/// After the start nothing is told for so long, nanoseconds: what others have not sent yet is no fault.
+/// Time after the start without reports, nanoseconds: other nodes may not have sent anything yet.
 const QUIET_NS: u64 = 1_000_000_000;
-/// Faults told at a time; a thousand bodies without frames have one cause.
+/// Most faults reported at a time: a thousand bodies without frames usually have one cause.
 const FAULTS_MAX: usize = 10;
 /// Token of the waker.
 const WAKE: Token = Token(usize::MAX);
 
-/// The receiving thread's own things.
+/// State of the receiving thread.
 pub(super) struct Inlet {
     lines: Vec<Line>,
     services: Services,
@@ -62,7 +62,7 @@ pub(super) struct Inlet {
     wake: Box<dyn Fn() + Send>,
     local: Local,
     early: Early,
-    /// The daemon's heartbeat: a longer silence of this loop means that the process stood still, nanoseconds.
+    /// The daemon's heartbeat, nanoseconds: a longer gap between two rounds means that the process was stopped.
     heartbeat_ns: u64,
     poll: Poll,
     updates: Vec<Update>,
@@ -73,10 +73,10 @@ pub(super) struct Inlet {
 impl Inlet {
     /// Registers every subscription.
     ///
-    /// * returns - the thread's things, and what wakes it.
+    /// * returns - the thread's state, and its waker.
     ///
     /// # Errors
-    /// `Error::Io` when there is no descriptor or thread left.
+    /// `Error::Io` if no file descriptor or thread is left.
     pub(super) fn new(
         (mut lines, mut services, mut answers): (Vec<Line>, Services, Answers),
         sources: Vec<Source>,
@@ -140,7 +140,7 @@ impl Inlet {
         }
     }
 
-    /// How long to sleep where nobody wakes: who tells of new names does.
+    /// Time to sleep until frames that wait for names are due; new names wake the thread.
     fn sleep(&self) -> Duration {
         self.early.until_ns().map_or(SLEEP, |until_ns| {
             let left_ns = until_ns.saturating_sub(SystemClock.boottime_ns());
@@ -148,7 +148,7 @@ impl Inlet {
         })
     }
 
-    /// Takes what is there; whether there may be more.
+    /// Takes the pending samples of all subscriptions; returns whether there may be more.
     fn round(&mut self, mut receipt: Receipt) -> bool {
         for source in &mut self.sources {
             let timeout_ns = self.shared.timeout_ns(source.place);
@@ -159,12 +159,11 @@ impl Inlet {
         for at in 0..self.lines.len() {
             let (some, rest) = self.take(at, receipt);
             more |= rest;
-            // Stamps of this round are compared with the time that it brought.
+            // Stamps of this round are compared with the clock of this round.
             if self.lines.get(at).is_some_and(Line::is_clock) {
                 receipt.ros_now_ns = self.shared.now().to_ns();
             }
-            // A whole frame waits for nothing else: each look at a quiet subscription or server is a call into the
-            // system.
+            // A whole frame is handed on at once: looking at idle subscriptions and servers costs a system call each.
             if some && self.lines.get(at).is_some_and(Line::is_whole) {
                 (self.wake)();
             } else {
@@ -186,7 +185,7 @@ impl Inlet {
         more
     }
 
-    /// Drains one subscription; whether something came, and whether there may be more.
+    /// Drains one subscription; returns whether samples came, and whether there may be more.
     fn take(&mut self, at: usize, receipt: Receipt) -> (bool, bool) {
         let Self {
             lines,
@@ -259,7 +258,7 @@ impl Inlet {
         }
     }
 
-    /// Bodies whose chains have changed; whether there are any.
+    /// Hands on bodies whose chains have changed; returns whether there are any.
     fn look(&mut self, receipt: Receipt) -> bool {
         let (mut came, mut skew_ns) = (false, None);
         for (place, source) in self.sources.iter_mut().enumerate() {
@@ -282,7 +281,7 @@ impl Inlet {
         all.extend(self.shared_topics());
         all.extend(self.unheard().into_iter().take(FAULTS_MAX));
         for source in &mut self.sources {
-            // Sources of one topic say the same of what is not theirs.
+            // Sources on one topic report the same faults of links that are not theirs.
             for fault in source.faults(FAULTS_MAX, now_ns) {
                 if !all.contains(&fault) {
                     all.push(fault);
@@ -294,9 +293,9 @@ impl Inlet {
     }
 }
 
-/// Takes frames of `~/transforms`, and those that came before and whose time has come.
+/// Takes frames of `~/transforms`, and earlier ones whose names are known by now.
 ///
-/// * returns - whether some came, and whether there may be more.
+/// * returns - whether frames came, and whether there may be more.
 fn take_frames(
     from: &Subscription<BodyTransforms>,
     (shelf, shared): (&Shelf, &Shared),
@@ -304,7 +303,7 @@ fn take_frames(
     early: &mut Early,
     receipt: Receipt,
 ) -> (bool, bool) {
-    // The revision first: the book is never older than what it is taken for.
+    // The revision is read first, so that the names are at least as new as it.
     let names_rev = shared.names_rev();
     let book = shared.book();
     let mut put = |message: &BodyTransforms, receipt, refused| {
@@ -343,9 +342,9 @@ fn take_one(
     shelf.merge(feeder.source, &updates);
 }
 
-/// Takes what a subscription holds.
+/// Takes the samples of a subscription.
 ///
-/// * returns - whether something came, and whether there may be more.
+/// * returns - whether samples came, and whether there may be more.
 fn drain<M: DeserializeOwned + 'static>(
     from: &Subscription<M>,
     shared: &Shared,

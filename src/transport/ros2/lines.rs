@@ -1,4 +1,4 @@
-//! Subscriptions: which topics a scene needs, each once, and who sends on them. In: sources, names. Out: [`Line`]s.
+//! Subscriptions to the topics that a scene needs, each once, and their publishers. In: sources, names. Out: [`Line`]s.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -16,8 +16,8 @@ use crate::error::{Error, Result};
 use crate::transport::BodyChange;
 use crate::wire::ros::{BodyTransforms, Clock, Odometry, PoseStamped, TfMessage};
 
-/// Frames of a client. Lockstep wants each of them, and best effort takes them from reliable senders and from others;
-/// one that is lost is counted as skipped, by its number, and would come too late if it was sent again.
+/// Frames of a client. Lockstep needs each of them. Best effort matches reliable senders and others; a lost frame is
+/// counted as skipped by its number, and would come too late if it was sent again.
 const FRAMES: In = In {
     reliable: false,
     latched: false,
@@ -29,41 +29,41 @@ const LINKS: In = In {
     depth: 100,
     ..FRAMES
 };
-/// Links that never change: said once, perhaps long ago.
+/// Links that never change: sent once, perhaps long ago.
 const FIXED_LINKS: In = In {
     reliable: true,
     latched: true,
     ..LINKS
 };
-/// The newest is all that counts.
+/// Topics of which only the newest message counts.
 const NEWEST: In = In { depth: 1, ..FRAMES };
-/// More samples than a topic keeps.
+/// More samples than DDS keeps of a topic.
 const FORMER_MAX: usize = 1 << 16;
 const TF: TypeName = ("tf2_msgs", "TFMessage");
 
-/// A subscription and where its messages go.
+/// A subscription, and the receiver of its messages.
 pub(super) enum Line {
     /// `~/transforms`.
     Transforms(Subscription<BodyTransforms>),
-    /// Links, for these sources.
+    /// Links for some sources.
     Links {
         /// The subscription.
         from: Subscription<TfMessage>,
         /// Whether they never change.
         fixed: bool,
-        /// Places of the sources.
+        /// Indices of the sources.
         sources: Vec<usize>,
     },
     /// Poses of one body.
     Pose(Subscription<PoseStamped>, Feeder),
     /// Odometry of one body.
     Odometry(Subscription<Odometry>, Feeder),
-    /// Simulated time, its order, and who tells it.
+    /// Simulated time, its order, and its publishers.
     Clock(Subscription<Clock>, Order, Heard),
 }
 
 impl Line {
-    /// Lets a poll wake for it.
+    /// Registers it with a poll.
     pub(super) fn register(&mut self, registry: &Registry, token: Token) -> std::io::Result<()> {
         let wanted = Interest::READABLE;
         match self {
@@ -75,8 +75,8 @@ impl Line {
         }
     }
 
-    /// The same of a body's own line, which is taken at each look whoever wakes for it: where it fails that is a fault
-    /// until it succeeds.
+    /// As [`Self::register`] for the line of one body. Since every round looks at it anyway, a failure is only a fault
+    /// until a later try succeeds.
     pub(super) fn wake_by(&mut self, registry: &Registry, token: Token) {
         let done = self.register(registry, token);
         if let Self::Pose(_, feeder) | Self::Odometry(_, feeder) = self {
@@ -84,29 +84,29 @@ impl Line {
         }
     }
 
-    /// Whether nobody wakes for it.
+    /// Whether its registration failed.
     pub(super) fn is_unwoken(&self) -> bool {
         self.feeder().is_some_and(|feeder| feeder.unwoken.is_some())
     }
 
-    /// Whether its messages are whole frames, which need no look at anything else.
+    /// Whether its messages are whole frames, which are independent of other lines.
     pub(super) fn is_whole(&self) -> bool {
         matches!(self, Self::Transforms(_))
     }
 
-    /// Whether it tells the time.
+    /// Whether it is that of `/clock`.
     pub(super) fn is_clock(&self) -> bool {
         matches!(self, Self::Clock(..))
     }
 
-    /// Gives it to a body: place of its source, and its own among those of the source.
+    /// Assigns it to a body: index of its source, and index of the body within the source.
     pub(super) fn feed(&mut self, source: usize, member: usize) {
         if let Self::Pose(_, feeder) | Self::Odometry(_, feeder) = self {
             (feeder.source, feeder.member) = (source, member);
         }
     }
 
-    /// Whose topic it is, where it is one body's.
+    /// The feeder, if it is the line of one body.
     pub(super) fn feeder(&self) -> Option<&Feeder> {
         match self {
             Self::Pose(_, feeder) | Self::Odometry(_, feeder) => Some(feeder),
@@ -114,7 +114,7 @@ impl Line {
         }
     }
 
-    /// What is wrong with who sends.
+    /// Text of a fault of its publishers or its registration.
     pub(super) fn fault(&self, now_ns: u64) -> Option<String> {
         match self {
             Self::Pose(_, feeder) | Self::Odometry(_, feeder) => feeder.fault(now_ns),
@@ -127,23 +127,23 @@ impl Line {
     }
 }
 
-/// Whose topic it is, and who sends on it.
+/// The body of a topic, and the topic's publishers.
 #[derive(Clone, Debug)]
 pub(super) struct Feeder {
-    /// Place of the source.
+    /// Index of the source.
     pub(super) source: usize,
-    /// Place of the body among those of its source.
+    /// Index of the body within the source.
     pub(super) member: usize,
     /// The topic's full name.
     pub(super) topic: String,
-    /// Who sends on it.
+    /// Its publishers.
     heard: Heard,
-    /// Why nobody wakes for what comes.
+    /// Why the registration failed, if it did.
     unwoken: Option<String>,
 }
 
 impl Feeder {
-    /// A message came.
+    /// Records a message.
     pub(super) fn hear(&mut self, info: &MessageInfo, now_ns: u64) {
         self.heard.hear(info.publisher_gid(), now_ns);
     }
@@ -164,12 +164,12 @@ impl Feeder {
     }
 }
 
-/// The publishers last heard of one thing, and when, nanoseconds of `CLOCK_BOOTTIME`.
+/// The last publishers of a topic, and when each was heard, nanoseconds of `CLOCK_BOOTTIME`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Heard {
-    /// The newest first. More that send strictly by turns are not told.
+    /// The newest first. More publishers than this that send strictly in turn are not detected.
     last: [Option<(Gid, u64)>; 8],
-    /// When one was heard again after another.
+    /// Time at which one was heard again after another, nanoseconds of `CLOCK_BOOTTIME`.
     together_ns: Option<u64>,
 }
 
@@ -177,13 +177,13 @@ pub(super) struct Heard {
 const TOGETHER_NS: u64 = 1_000_000_000;
 
 impl Heard {
-    /// One sent something.
+    /// Records a message of a publisher.
     pub(super) fn hear(&mut self, from: Gid, now_ns: u64) {
         let is_fresh = |at: u64| now_ns.saturating_sub(at) < TOGETHER_NS;
         let mut last = self.last.iter();
         let place = last.position(|heard| heard.is_some_and(|(own, _)| own == from));
         let [newest, ..] = self.last;
-        // One that starts anew is another and the first is never heard again.
+        // A restarted publisher is a new one, and the old one is never heard again: that is no fault.
         if place.is_some_and(|place| place > 0) && newest.is_some_and(|(_, at)| is_fresh(at)) {
             self.together_ns = Some(now_ns);
         }

@@ -1,11 +1,12 @@
-//! The node, opened anew where DDS's own threads have ended, or where a participant that it took as gone is back.
+//! Opens the node again if threads of DDS have ended, or if a participant that was given up is back.
 //!
-//! In: how to open a node. Out: a door that goes on with another node. Each thread of rustdds 0.15 ends for good when
-//! its wait is interrupted, which a stop and a continue of the process does (SIGSTOP and SIGCONT, a debugger); the node
-//! would then be deaf and mute while the daemon ticks on. Seen by `tests/python/ros2`. A thread of this file looks once
-//! a second, and opening and closing are its work, so that the tick never waits for them; peers find the new
-//! participant as they find a restarted daemon, with the boot id as it was, and miss a second or two. A participant
-//! that was away for longer than its lease is not heard by the old node any more (`absent`).
+//! In: how to open a node. Out: a door that continues with another node.
+//!
+//! Each thread of rustdds 0.15 ends for good when its wait is interrupted, for example by SIGSTOP and SIGCONT or a
+//! debugger; the node then neither receives nor sends while the daemon ticks on (see `tests/python/ros2`). A thread
+//! checks this once a second; it also opens and closes nodes, so that the tick never waits for that. Peers discover the
+//! new participant like that of a restarted daemon, but with the same boot id, and miss a second or two. The old node
+//! does not hear a participant that was away for longer than its lease (`absent`).
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -19,41 +20,41 @@ use crate::time::{Clock, SystemClock};
 use crate::transport::{BodyChange, Door, RequestToken, Setting, Wake};
 use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow, Undelivered};
 
-/// How often it is looked whether DDS lives: silence is told by the lease after 3 s.
+/// Time between two checks of DDS: peers notice silence by the lease after 3 s.
 const LOOK: Duration = Duration::from_secs(1);
-/// Between two new nodes for participants that are back, nanoseconds: each costs all others a second or two, and on a
-/// network that comes and goes somebody is always back.
+/// Least time between two new nodes for returning participants, nanoseconds: each new node costs all peers a second or
+/// two, and on an unreliable network some participant is always returning.
 const BACK_NS: u64 = 30_000_000_000;
-/// Names of DDS's threads, as far as the system keeps them.
+/// Names of the threads of DDS, as truncated by the system.
 const DDS_THREADS: [&str; 2] = ["RustDDS Partici", "RustDDS discove"];
-/// Requests of one node are told from those of the next by their upper bits; the uppermost is the daemon's.
+/// The upper bits of a request number identify the node; the uppermost bit is the daemon's.
 const NODE_SHIFT: u32 = 40;
 
 /// Opens the node for a scene.
 pub type Opener = Box<dyn Fn(&RosScene) -> Result<RosNode> + Send>;
 
-/// What the door and the thread that looks tell each other.
+/// Flags shared by the door and the watching thread.
 #[derive(Clone, Debug, Default)]
 struct Flags {
-    /// The node is to be given away.
+    /// The door must hand over the node.
     dead: Arc<AtomicBool>,
-    /// A participant is back that the node does not hear.
+    /// A participant is back that the node cannot hear.
     back: Arc<AtomicBool>,
-    /// The thread is to end.
+    /// The thread must end.
     ended: Arc<AtomicBool>,
 }
 
-/// A node that is opened anew when DDS has died beneath it.
+/// A node that is opened again when its DDS threads have ended.
 pub struct LastingNode {
-    /// `None` while it is opened anew.
+    /// `None` while it is being opened again.
     live: Option<RosNode>,
-    /// Which node it is, from 0.
+    /// Number of the node, from 0.
     number: u64,
-    /// Whether the node must be told all names, because it did not hear them before.
+    /// Whether the node needs all names, because it is new.
     tell_names: bool,
-    /// The scene as edits have left it.
+    /// The scene including all edits so far.
     scene: Arc<Mutex<RosScene>>,
-    /// What edits did while there was no node; the next one may have been opened before them.
+    /// Changes by edits while there was no node; the next one may have been opened before them.
     missed: Vec<BodyChange>,
     flags: Flags,
     broken: Option<Sender<RosNode>>,
@@ -99,15 +100,15 @@ impl LastingNode {
         })
     }
 
-    /// Gives a dead node away, takes the new one.
+    /// Hands over a dead node, and takes the new one.
     fn exchange(&mut self, inbox: &mut Inbox) {
         let is_back = self.live.as_ref().is_some_and(RosNode::is_to_open_anew);
         self.flags.back.store(is_back, Ordering::Relaxed);
         if self.live.is_some() && self.flags.dead.load(Ordering::Acquire) {
             if let (Some(mut node), Some(broken)) = (self.live.take(), &self.broken) {
-                // Nobody else says that it is over: the next node would be a stranger for a time-out.
+                // Its sessions are ended here: otherwise the next node's would be refused for a time-out.
                 node.end(inbox);
-                // A watcher that is gone drops it: there is nobody to mend it.
+                // If the watching thread has ended, the node is dropped.
                 let _gone = broken.send(node);
             }
         } else if self.live.is_none()
@@ -132,7 +133,7 @@ impl Drop for LastingNode {
     }
 }
 
-/// Looks, and opens the node anew where it must.
+/// Watches the node, and opens it again if necessary.
 fn watch(
     (opener, scene): (&Opener, &Mutex<RosScene>),
     flags: &Flags,
@@ -188,7 +189,7 @@ fn watch(
     }
 }
 
-/// Whether each of DDS's threads is there. A system without /proc says nothing, and then they are.
+/// Whether all threads of DDS exist; assumed without /proc.
 fn dds_lives() -> bool {
     let Ok(tasks) = std::fs::read_dir("/proc/self/task") else {
         return true;
@@ -256,7 +257,7 @@ impl Door for LastingNode {
                 let token = RequestToken(token.0 & ((1 << NODE_SHIFT) - 1));
                 node.answer(token, ok, json)
             }
-            // Who asked has left with the node.
+            // The client's request ended with the node.
             _ => Ok(()),
         }
     }
@@ -338,7 +339,7 @@ mod tests {
         let mut inbox = Inbox::default();
         node.receive(&mut inbox, &SystemClock);
         assert!(inbox.is_empty());
-        // As the thread that looks says it.
+        // As the watching thread would set it.
         node.flags.dead.store(true, Ordering::Release);
         node.receive(&mut inbox, &SystemClock);
         assert_eq!(inbox.ended(), [9]);

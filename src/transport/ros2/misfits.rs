@@ -1,5 +1,5 @@
-//! Endpoints of others that DDS matches with none of this node's because their qualities of service do not go together,
-//! as of rclpy's default publisher on `/tf_static`. In: what DDS says of them, once each. Out: words while they last.
+//! Endpoints of other nodes that DDS does not match because their qualities of service are incompatible, such as
+//! rclpy's default publisher on `/tf_static`. In: events of DDS, one per pair. Out: texts for as long as they exist.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,22 +8,22 @@ use rustdds::{GUID, QosPolicies};
 
 use super::told::brief;
 
-/// Most that is told of at once; many nodes of one kind have one cause, and mostly one topic.
+/// Most reports at a time: many nodes of one kind have one cause, and mostly one topic.
 const TOLD_MAX: usize = 10;
 
-/// What a remote endpoint is.
+/// Kind of a remote endpoint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Remote {
-    /// It sends, and this node would read.
+    /// A writer that this node would read.
     Publisher,
-    /// It would read what this node sends.
+    /// A reader of a topic of this node.
     Subscriber,
 }
 
-/// Pairs of endpoints that do not go together, this node's first.
+/// Incompatible pairs of endpoints, this node's first.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Misfits {
-    /// The topic's full name, and what is wrong.
+    /// The topic's full name, and the text.
     of: BTreeMap<(GUID, GUID), (String, String)>,
     new: Vec<String>,
 }
@@ -33,7 +33,7 @@ impl Misfits {
         self.of.contains_key(&two)
     }
 
-    /// Takes two that do not go together.
+    /// Adds an incompatible pair.
     ///
     /// * `topic` - as DDS names it.
     pub(super) fn put(
@@ -50,30 +50,30 @@ impl Misfits {
         self.of.insert(two, (topic.to_owned(), text));
     }
 
-    /// Those go together now, or one of them is gone.
+    /// Removes a pair that matches now, or of which one is gone.
     pub(super) fn lose(&mut self, gone: impl Fn(&GUID, &GUID) -> bool) {
         self.of.retain(|(local, remote), _| !gone(local, remote));
     }
 
-    /// A topic, by its full name, is nothing to this node any more.
+    /// Removes all pairs of a topic, given by its full name, that this node no longer uses.
     pub(super) fn part(&mut self, topic: &str) {
         self.of.retain(|_, (own, _)| own != topic);
     }
 
-    /// What is so now, each once.
+    /// Texts of the current pairs, each once.
     pub(super) fn found(&self) -> Vec<String> {
         let all: BTreeSet<&str> = self.of.values().map(|(_, text)| text.as_str()).collect();
         all.into_iter().take(TOLD_MAX).map(str::to_owned).collect()
     }
 
-    /// What is new since the last call.
+    /// Texts that are new since the last call.
     pub(super) fn take_new(&mut self) -> Vec<String> {
         std::mem::take(&mut self.new)
     }
 }
 
 fn words(topic: &str, remote: Remote, offered: &QosPolicies, requested: &QosPolicies) -> String {
-    // What is not said is the least of its kind.
+    // A policy that is not given has its weakest value.
     let durable = |qos: &QosPolicies| qos.durability().unwrap_or(Durability::Volatile);
     let reliable =
         |qos: &QosPolicies| matches!(qos.reliability(), Some(Reliability::Reliable { .. }));

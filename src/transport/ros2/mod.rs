@@ -1,15 +1,15 @@
-//! The ROS 2 node: the one door to ros2-client and rustdds. In: topics of anybody in the DDS domain. Out: frames for
-//! the tick thread, and its ticks as topics.
+//! The ROS 2 node: the only module that uses ros2-client and rustdds. In: topics of the DDS domain. Out: frames for the
+//! tick thread, and ticks as topics.
 //!
-//! Threads, none of which the tick thread waits for: `ros-rx` (`inlet`: subscriptions, decoding, chains of frames,
-//! services, parameters), `ros-words` (`services/scribe`: requests as JSON), `ros-tx` (`outlet`: messages, publishing),
-//! and those of DDS itself.
+//! Threads: `ros-rx` (`inlet`: subscriptions, decoding, chains of frames, services, parameters), `ros-words`
+//! (`services/scribe`: requests as JSON), `ros-tx` (`outlet`: messages, publishing), and those of DDS. The tick thread
+//! waits for none of them.
 //!
-//! Between them and the tick stand a shelf of frames (`shelf`) and a queue of two parcels (`parcel`):
-//! the newest wins, and what gave way is counted. The tick thread never calls into DDS, which may block.
+//! Frames pass through a shelf (`shelf`), ticks through a queue of two parcels (`parcel`): the newest wins, and what it
+//! replaces is counted. The tick thread never calls DDS, which may block.
 //!
-//! Order at the end is a promise: the sending and receiving threads first, with them the node, which takes its name out
-//! of the graph, then the context; in any other order the name stays in the graph for 50 s.
+//! Shutdown has a fixed order: the sending and receiving threads with the node, which removes its name from the graph,
+//! then the context. In any other order the name stays in the graph for 50 s.
 
 mod absent;
 pub mod args;
@@ -54,25 +54,26 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use super::{BodyChange, BodyNote};
 use crate::config::{Config, RosSource};
 
-/// Takes a lock. One whose holder panicked has whole values still, because each change is one move; the panic is told.
+/// Takes a lock. After a panic of its holder the value is still valid, because each change is a single move; the panic
+/// itself is reported.
 fn open<T>(lock: &Mutex<T>) -> MutexGuard<'_, T> {
     lock.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What the node needs to know of a scene.
+/// Data of a scene for the node.
 #[derive(Clone, Debug, Default)]
 pub struct RosScene {
     /// The scene's frame.
     pub frame_id: String,
-    /// How the daemon runs at the start.
+    /// The daemon's settings at the start.
     pub config: Config,
-    /// Its sources, in its order.
+    /// Its sources, in order.
     pub sources: Vec<RosSourceSpec>,
     /// Its bodies.
     pub bodies: Vec<BodyNote>,
-    /// Parameters set while a node of it ran.
+    /// Parameters that were set while an earlier node ran.
     pub kept: Kept,
-    /// Whether a node of it has run before in this daemon.
+    /// Whether an earlier node has run in this daemon.
     pub again: bool,
 }
 
@@ -83,12 +84,12 @@ pub struct RosSourceSpec {
     pub name: String,
     /// Its time-out, nanoseconds.
     pub timeout_ns: u64,
-    /// Its topics; `None`: it sends whole frames.
+    /// Its common topics; `None`: it sends frames on `~/transforms`.
     pub ros2: Option<RosSource>,
 }
 
 impl RosScene {
-    /// Follows an edit.
+    /// Applies a change by an edit.
     fn follow(&mut self, change: &BodyChange) {
         if let BodyChange::Hung { name, attached } = change {
             let body = self.bodies.iter_mut().find(|body| body.name == *name);

@@ -1,7 +1,7 @@
-//! Other nodes of this one's name. In: what participants say of their nodes. Out: a word on each namesake, once.
+//! Other nodes with the name of this one. In: announcements of nodes by participants. Out: one text per namesake.
 //!
-//! A reader of its own, because the crate's hands its finds on over a channel of eight that drops what comes in a
-//! burst, and a burst is what discovery is: of two nodes of one name, neither told in every second start.
+//! It has its own reader: that of the crate passes its finds through a channel of eight entries, which overflows during
+//! discovery, so that in every second start neither of two namesakes was reported.
 
 use ros2_client::entities_info::ParticipantEntitiesInfo;
 use ros2_client::{Context, Gid, builtin_topics};
@@ -12,9 +12,9 @@ use rustdds::{QosPolicyBuilder, RTPSEntity as _, TopicKind};
 use super::topics::failed;
 use crate::error::Result;
 
-/// Words of participants that may wait; each change of a node is one, and the newest of a participant says it all.
+/// Announcements that may wait; each change of a node is one, and the newest of a participant is complete.
 const WAITING: i32 = 256;
-/// Namesakes told; beyond them one is told again.
+/// Most namesakes remembered as reported; beyond that one may be reported again.
 const TOLD_MAX: usize = 64;
 
 /// Looks for namesakes.
@@ -23,12 +23,12 @@ pub(super) struct Namesakes {
     /// This node's full name and participant.
     name: String,
     gid: Gid,
-    /// Participants that were told of.
+    /// Participants that were reported.
     told: Vec<Gid>,
 }
 
 impl Namesakes {
-    /// A look-out for a node.
+    /// Starts the search for a node.
     ///
     /// * `name` - its full name.
     ///
@@ -36,7 +36,7 @@ impl Namesakes {
     /// `Error::Io` when DDS refuses.
     pub(super) fn of(context: &Context, name: String) -> Result<Self> {
         let participant = context.domain_participant();
-        // Whoever came before has said it already: the last word of each is asked for.
+        // Earlier participants have announced their nodes already: the last announcement of each is requested.
         let qos = QosPolicyBuilder::new()
             .durability(Durability::TransientLocal)
             .reliability(Reliability::Reliable {
@@ -63,9 +63,9 @@ impl Namesakes {
         })
     }
 
-    /// What there is to say of a namesake that was not told of yet.
+    /// Text about a namesake that was not reported yet.
     pub(super) fn look(&mut self) -> Option<String> {
-        // A word that cannot be read is one of another ROS distribution, and no namesake that can be told.
+        // An unreadable announcement comes from another ROS distribution.
         while let Some(sample) = self.reader.take_next_sample().transpose() {
             let Ok(sample) = sample else { continue };
             let info = sample.value();

@@ -1,5 +1,5 @@
-//! The node as the daemon sees it: opened on the daemon's thread, a [`Door`] beside the one of shared memory, closed
-//! in the order that takes its name out of the graph at once.
+//! The node as a [`Door`] of the daemon, beside that of shared memory. It is opened on the daemon's thread and closed
+//! in the order that removes its name from the graph at once.
 
 mod files;
 mod make;
@@ -45,17 +45,17 @@ use crate::wire::{
     WIRE_VERSION,
 };
 
-/// The node's name where nobody says another.
+/// Default name of the node.
 const NODE_NAME: &str = "sweepd";
-/// How long the participant outlives its node.
+/// Time between the end of the node and that of its participant.
 const FAREWELL: Duration = Duration::from_millis(100);
 
-/// How the node opens.
+/// Options for opening the node.
 #[derive(Clone, Debug)]
 pub struct RosOptions {
-    /// What was said behind `--ros-args`.
+    /// The arguments after `--ros-args`.
     pub args: RosArgs,
-    /// Domain and range.
+    /// Domain and discovery range.
     pub network: Network,
     /// Random number of this start, never 0.
     pub boot_id: u64,
@@ -73,7 +73,7 @@ pub struct RosNode {
     receiving: Option<JoinHandle<()>>,
     sending: Option<JoinHandle<()>>,
     demand: Demand,
-    /// Who waits for the next tick.
+    /// Requests that wait for the next tick.
     ticks_asked: Vec<u64>,
 }
 
@@ -91,7 +91,7 @@ impl RosNode {
     /// * `wake` - wakes the tick thread.
     ///
     /// # Errors
-    /// `Error::Usage` for names that are none or collide, `Error::Refused` for a node that cannot be kept on this host.
+    /// `Error::Usage` for invalid or colliding names, `Error::Refused` if the node cannot be confined to this host.
     pub fn open(
         options: &RosOptions,
         scene: &RosScene,
@@ -107,7 +107,7 @@ impl RosNode {
         let (context, noise) = join(options.network)?;
         let mut node = make(options, &context, &names)?;
         shared.take(table.effects());
-        // Before any writer, so that no reader of one is missed.
+        // Before any writer is created, so that no reader is missed.
         let (readers, sources) = (Readers::of(&context), Source::of(scene));
         let (heartbeat_ns, local) = (scene.config.heartbeat_ns, Local::of(scene, options.boot_id));
         let shelf = Arc::new(shelf(&sources, options.session));
@@ -119,7 +119,7 @@ impl RosNode {
         let (mapping, edits) = (mapping(options.network), table.flag("ros.allow_edits"));
         let services = Services::create((&mut node, mapping), &mut names, edits)?;
         let answers = Answers::create((&mut node, mapping), &context, &mut names, &table)?;
-        // Behind all that is the node's own: no body has a name of these.
+        // After all names of the node itself, so that no body gets one of these.
         let (lines, unheard) = subscribe(&mut node, &context, &mut names, &sources, scene.again)?;
         odd.extend(unheard);
         let topics = Topics::of(scene, &names, &fed(&lines));
@@ -180,12 +180,12 @@ impl RosNode {
         Ok(open)
     }
 
-    /// Whether this node cannot hear all that lives, and a new one could.
+    /// Whether there are live participants that this node cannot hear and a new one could.
     pub(super) fn is_to_open_anew(&self) -> bool {
         self.shared.again.load(Ordering::Relaxed)
     }
 
-    /// Gives up all that waits, and says that the sessions of its sources of common topics are over.
+    /// Hands over the waiting frames, then the ends of its sessions of common topics.
     pub(super) fn end(&mut self, inbox: &mut Inbox) {
         self.shelf.drain(inbox);
         self.shelf.end(inbox);
@@ -197,7 +197,7 @@ impl RosNode {
         Ok(())
     }
 
-    /// Says where the node is, what opens it, and what was odd at the start.
+    /// Logs the node's name, domain and range, and warnings of the start.
     fn greet(&self, network: Network, names: &Names, odd: &[String]) {
         let reach = match network.range {
             Range::Localhost if network.pinned => {
@@ -238,18 +238,18 @@ impl RosNode {
         }
     }
 
-    /// Ends the threads and leaves the graph.
+    /// Ends the threads, and leaves the graph.
     fn close(&mut self) {
         self.shared.stop.store(true, Ordering::Relaxed);
         self.parcels.stop();
         let _gone_already = self.waker.wake();
-        // The way to /rosout goes before the node does, and the node goes with the sending thread.
+        // The writer of /rosout is dropped before the node, which ends with the sending thread.
         self.shared.set_rosout(None);
         for thread in [self.receiving.take(), self.sending.take()] {
             let _told_by_its_panic = thread.map(JoinHandle::join);
         }
-        // The node has said that it goes. Who missed that can ask again only while the participant lives; who cannot
-        // ask shows the name until its lease ends.
+        // The node has announced its end. Peers that missed it can ask again only while the participant lives; others
+        // show the name until the lease ends.
         #[allow(
             clippy::disallowed_methods,
             reason = "the end of the process, with nothing left to wait on"
@@ -265,14 +265,14 @@ impl Drop for RosNode {
     }
 }
 
-/// What the threads share, with the names before the first tick.
+/// State shared by the threads, with the names before the first tick.
 fn shared(options: &RosOptions, scene: &RosScene, names: &Names, book: Book) -> Arc<Shared> {
     let least = Say::least(options.args.log_level.as_deref());
     let timeouts_ns: Vec<u64> = scene.sources.iter().map(|s| s.timeout_ns).collect();
     Arc::new(Shared::new(&names.logger(), book, &timeouts_ns, least))
 }
 
-/// A shelf with the bodies of common topics.
+/// A shelf for the bodies of common topics.
 fn shelf(sources: &[Source], session: u64) -> Shelf {
     let shelf = Shelf::default();
     for source in sources {
@@ -281,13 +281,13 @@ fn shelf(sources: &[Source], session: u64) -> Shelf {
     shelf
 }
 
-/// The boxes of bodies that have an end.
+/// The boxes of bounded bodies.
 fn boxes(scene: &RosScene) -> Boxes {
     let bodies = scene.bodies.iter();
     bodies.filter_map(|b| Some((b.id, b.bounds?))).collect()
 }
 
-/// The names before the first tick says them.
+/// The names before the first tick publishes them.
 fn first_names(scene: &RosScene) -> Vec<NameRow> {
     let row = |body: &BodyNote| {
         let mut name = [0; BODY_NAME_LEN];
@@ -314,7 +314,7 @@ fn thread(name: &str, work: impl FnOnce() + Send + 'static) -> Result<JoinHandle
 }
 
 impl Door for RosNode {
-    /// Returns at once: the receiving thread wakes the door that is waited on.
+    /// Returns at once: the receiving thread wakes the door that the daemon waits on.
     fn wait(&mut self, _timeout_ns: u64, _clock: &dyn Clock) -> Result<Wake> {
         Ok(Wake::default())
     }
@@ -331,7 +331,7 @@ impl Door for RosNode {
     fn publish(&mut self, outbox: &Outbox) -> Result<Undelivered> {
         self.shelf.hear(&outbox.tick, random_u64);
         let gone = self.parcels.put(outbox, self.demand, self.shared.caps());
-        // Told by the sending thread, with the topics; none of it is of shared memory.
+        // Done by the sending thread, together with the topics; no shared memory is involved.
         self.shared.note_unsent(gone);
         if !self.ticks_asked.is_empty() {
             let header = outbox.tick.header;

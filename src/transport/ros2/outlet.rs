@@ -1,7 +1,7 @@
 //! The sending thread (`ros-tx`): turns parcels into messages and publishes them, the tick last.
 //!
-//! In: parcels of the tick thread. Out: topics; who listens to them. A message that DDS does not take at once is held
-//! while it may be taken soon, and counted where it is lost; this thread does not wait for it.
+//! In: parcels of the tick thread. Out: topics, and the demand of their readers. A message that DDS does not accept at
+//! once is kept for a short time, and counted if it is lost; this thread does not wait for it.
 
 mod heard;
 mod latest;
@@ -40,20 +40,20 @@ use crate::transport::open_files;
 use crate::wire::ros::{Counts, Speaker};
 use crate::wire::{Demand, NameRow};
 
-/// Longest sleep: how soon a new reader is noticed.
+/// Longest sleep: the delay until a new reader is noticed.
 const SLEEP: Duration = Duration::from_millis(100);
-/// As [`SLEEP`], while a writer has not taken all: how late at most a message is that was held.
+/// As [`SLEEP`], while a writer has not accepted all: the longest extra delay of a kept message.
 const SLEEP_HOLDING: Duration = Duration::from_millis(5);
-/// Between two messages of diagnostics, nanoseconds: what `/diagnostics` is read at.
+/// Time between two messages of `/diagnostics`, nanoseconds.
 const DIAGNOSTICS_NS: u64 = 1_000_000_000;
-/// The sending thread's own things.
+/// State of the sending thread.
 pub(super) struct Outlet {
     pub(super) node: Node,
     pub(super) context: Context,
     pub(super) publishers: Publishers,
     pub(super) parcels: Arc<Parcels>,
     pub(super) shared: Arc<Shared>,
-    /// Of the receiving thread.
+    /// Waker of the receiving thread.
     pub(super) waker: Arc<Waker>,
     pub(super) speaker: Speaker,
     pub(super) boot_id: u64,
@@ -61,14 +61,14 @@ pub(super) struct Outlet {
     pub(super) name: String,
     pub(super) diagnoser: Diagnoser,
     pub(super) latest: Latest,
-    /// When diagnostics were last told, nanoseconds of `CLOCK_BOOTTIME`.
+    /// Time of the last diagnostics, nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) told_ns: u64,
-    /// When markers were last sent, nanoseconds of `CLOCK_BOOTTIME`.
+    /// Time of the last markers, nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) shown_ns: u64,
-    /// The daemon's, nanoseconds.
+    /// The daemon's heartbeat, nanoseconds.
     pub(super) heartbeat_ns: u64,
     pub(super) boxes: Boxes,
-    /// Contacts that the newest `~/collisions` does not hold.
+    /// Contacts that the newest `~/collisions` leaves out.
     pub(super) left_out: u64,
     pub(super) unsent: Unsent,
     pub(super) noise: Noise,
@@ -76,7 +76,7 @@ pub(super) struct Outlet {
     pub(super) readers: Readers,
     pub(super) read: Read,
     pub(super) namesakes: Namesakes,
-    /// Makes full names of the topics of bodies that come.
+    /// Makes full names of topics for bodies added later.
     pub(super) names: Names,
     /// The topics of bodies.
     pub(super) topics: Topics,
@@ -84,7 +84,7 @@ pub(super) struct Outlet {
     pub(super) sources: Vec<RosSourceSpec>,
 }
 
-/// What somebody listens to, as of the last look.
+/// The topics that have readers, as of the last look.
 #[derive(Clone, Copy, Debug, Default)]
 #[allow(
     clippy::struct_excessive_bools,
@@ -95,8 +95,8 @@ pub(super) struct Read {
     collisions: bool,
     pairs: bool,
     contacts: bool,
-    /// Any topic that a tick has a message on: `~/state` and `~/tick` go out with each of them, so that whoever has
-    /// rows has the tick that they are of.
+    /// Any topic of a tick: `~/state` and `~/tick` are sent with each of them, so that readers of rows also get the
+    /// tick that the rows belong to.
     ticks: bool,
 }
 
@@ -128,9 +128,9 @@ impl Outlet {
                     if let Some((scene_rev, rows)) = names {
                         self.take_names(scene_rev, &rows);
                     }
-                    // Names come with the first tick that has them, or with one before.
+                    // Names come with the first tick that has them, or with an earlier one.
                     if parcel.done && self.shared.set_names_rev(parcel.tick.header.scene_rev) {
-                        // Frames and answers may wait for them.
+                        // Frames and responses may wait for the names.
                         let _gone_already = self.waker.wake();
                     }
                     let now = self.shared.now();
@@ -145,7 +145,7 @@ impl Outlet {
         }
     }
 
-    /// Tells who was lost, and asks for a new node when one of them is back.
+    /// Reports lost participants, and asks for a new node when one of them is back.
     fn look_who_is_back(&mut self) {
         let absent = &mut self.readers.absent;
         for text in absent.take_lost() {
@@ -183,7 +183,7 @@ impl Outlet {
         });
     }
 
-    /// Publishes what writers have not taken; whether there is still some.
+    /// Publishes kept messages again; returns whether some are left.
     fn hand_over(&mut self) -> bool {
         let out = &mut self.publishers;
         let readers = &mut self.readers;
@@ -198,7 +198,7 @@ impl Outlet {
         out.hold()
     }
 
-    /// Markers at their own rate, collisions each tick; where somebody listens.
+    /// Publishes markers at their own rate and collisions each tick, if they have readers.
     fn show(&mut self, parcel: &Parcel) {
         let readers = &mut self.readers;
         let mut pen = Pen::of(&mut self.node, &self.context, &self.shared, readers);
@@ -222,7 +222,7 @@ impl Outlet {
         }
     }
 
-    /// Once a second, where somebody listens.
+    /// Publishes diagnostics once a second, if they have readers.
     fn diagnose(&mut self) {
         let now_ns = SystemClock.boottime_ns();
         let to = &self.publishers.diagnostics;
@@ -231,7 +231,7 @@ impl Outlet {
         if !due || self.readers.count(to) == 0 {
             return;
         }
-        // While nobody read, what is counted was told to nobody; it is no news of the last second.
+        // Counts from a time without readers are not reported as events of the last second.
         let is_first = since_ns > 2 * DIAGNOSTICS_NS;
         self.told_ns = now_ns;
         let row = self.latest.row();
@@ -275,7 +275,7 @@ impl Outlet {
         self.shared.note_unsent(lost);
     }
 
-    /// Contacts and pairs.
+    /// Publishes contacts and pairs.
     fn send_rows(&mut self, parcel: &Parcel) {
         let out = &mut self.publishers;
         let readers = &mut self.readers;
@@ -295,8 +295,8 @@ impl Outlet {
         }
     }
 
-    /// The tick, last: whoever has it has all that belongs to it, but what a topic holds for one of its readers. It
-    /// does not wait for that, since its own silence means that the daemon is gone.
+    /// Publishes the tick, last: a reader that has it has all messages of the tick, except those kept for slow readers.
+    /// The tick does not wait for these, since its silence would mean that the daemon is gone.
     fn send_tick(&mut self, parcel: &Parcel) {
         if !self.read.ticks {
             return;
@@ -316,7 +316,7 @@ impl Outlet {
     }
 }
 
-/// Publishes on a [`Wheel`], and counts what is lost.
+/// Publishes on a [`Wheel`], and counts lost messages.
 struct Pen<'a> {
     means: Means<'a>,
     shared: &'a Shared,

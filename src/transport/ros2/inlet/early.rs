@@ -1,7 +1,7 @@
-//! Frames of `~/transforms` that came before the names of their scene revision are known here: they wait, since a name
-//! that nobody has yet would be nobody's.
+//! Frames of `~/transforms` whose scene revision is newer than the names known here: they wait, since their new names
+//! could not be resolved.
 //!
-//! In: messages, the revision of the names. Out: messages whose time has come, those of a session in their order.
+//! In: messages, the revision of the names. Out: messages that may be resolved now, in order within each session.
 
 use std::collections::VecDeque;
 
@@ -10,7 +10,7 @@ use crate::limits::{FRAME_ROWS_MAX, FRAMES_PER_DRAIN_MAX};
 use crate::wire::ros::BodyTransforms;
 use crate::wire::{BODY_NAME_LEN, RejectReason};
 
-/// A message that waits, since when, and until when at most.
+/// A waiting message, with its receipt and its deadline.
 #[derive(Debug)]
 struct Waiting {
     message: BodyTransforms,
@@ -18,25 +18,24 @@ struct Waiting {
     until_ns: u64,
 }
 
-/// Frames that wait.
+/// Waiting frames.
 #[derive(Debug, Default)]
 pub(super) struct Early {
     waiting: VecDeque<Waiting>,
 }
 
 impl Early {
-    /// When the first of those that wait has waited for its time-out, nanoseconds of `CLOCK_BOOTTIME`; `None`: none
-    /// waits.
+    /// Earliest deadline of a waiting frame, nanoseconds of `CLOCK_BOOTTIME`; `None`: none waits.
     pub(super) fn until_ns(&self) -> Option<u64> {
         self.waiting.iter().map(|one| one.until_ns).min()
     }
 
-    /// Takes a message: one that must wait, or that comes behind one of its session that does, is kept; any other goes
-    /// to `put` at once, as do those that are refused because too many of their source wait, the oldest first.
+    /// Takes a message. It is kept if it must wait, or if an earlier one of its session waits; otherwise it goes to
+    /// `put` at once. If too many of a source wait, the oldest go to `put` as refused.
     ///
-    /// * `names_rev` - scene revision of the names that are known here.
-    /// * `timeout_ns` - of its source; `None`: the scene has no such source, and the frame is refused for that.
-    /// * `put` - takes messages, and why they are refused where they are.
+    /// * `names_rev` - scene revision of the names known here.
+    /// * `timeout_ns` - time-out of its source; `None`: the scene has no such source, so the frame will be refused.
+    /// * `put` - takes messages, with the reason if they are refused.
     pub(super) fn take(
         &mut self,
         message: BodyTransforms,
@@ -45,7 +44,7 @@ impl Early {
         timeout_ns: Option<u64>,
         put: &mut impl FnMut(&BodyTransforms, Receipt, Option<RejectReason>),
     ) {
-        // Only a session has an order (law 4.2): a stranger under the name of a source must not hold it up.
+        // Order exists only within a session (law 4.2): another sender with the same source name must not delay it.
         let is_behind =
             (self.waiting.iter()).any(|other| session(&other.message) == session(&message));
         let waits = is_behind || is_early(&message, names_rev);
@@ -62,13 +61,12 @@ impl Early {
         self.waiting.push_back(Waiting {
             message,
             receipt,
-            // As for frames that the daemon knows the names of (law 4.3): one time-out, then it is refused for its
-            // revision.
+            // As law 4.3 says for frames of later revisions: refused after one time-out.
             until_ns: receipt.now_ns.saturating_add(timeout_ns),
         });
     }
 
-    /// The oldest of a source, where this one of it would be one frame or one row too many.
+    /// The oldest waiting frame of a source, if this one would exceed the limit of frames or rows.
     fn crowded_out_by(&mut self, message: &BodyTransforms) -> Option<Waiting> {
         let of_source = |other: &&Waiting| other.message.source == message.source;
         let ahead = self.waiting.iter().filter(of_source);
@@ -80,7 +78,7 @@ impl Early {
         self.waiting.remove(oldest.filter(|_| !fits)?)
     }
 
-    /// A message whose time has come: its names are there, or it has waited for its time-out.
+    /// The next message whose names are known, or whose deadline has passed.
     pub(super) fn next(
         &mut self,
         now_ns: u64,
@@ -98,18 +96,18 @@ impl Early {
     }
 }
 
-/// Rows of a message, of which each takes memory.
+/// Number of rows of a message, for the limit of memory.
 fn rows(message: &BodyTransforms) -> usize {
     message.transforms.len().max(message.velocities.len())
 }
 
-/// Whether a message is of a size that can be good: no body has a longer name, and none more rows.
+/// Whether a message is within the limits of names and rows.
 fn may_be_kept(message: &BodyTransforms) -> bool {
     let is_short = |name: &str| name.len() <= BODY_NAME_LEN;
     rows(message) <= FRAME_ROWS_MAX && message.transforms.iter().all(|row| is_short(&row.name))
 }
 
-/// Whose a frame is: what has an order of its own.
+/// Sender of a frame: frames with equal keys have an order.
 fn session(message: &BodyTransforms) -> (&str, u64) {
     (&message.source, message.session)
 }
@@ -149,7 +147,8 @@ mod tests {
         }
     }
 
-    /// Takes one at a time of which the names are known up to revision 4; what comes out at once, with its refusal.
+    /// Takes a message while names are known up to revision 4; returns the messages that come out at once, with
+    /// refusals.
     fn take(
         early: &mut Early,
         message: BodyTransforms,
@@ -162,7 +161,7 @@ mod tests {
         out
     }
 
-    /// What comes out now, as sources and numbers.
+    /// The messages that come out now, as sources and numbers.
     fn out(early: &mut Early, now_ns: u64, names_rev: u64) -> Vec<(String, u64)> {
         std::iter::from_fn(|| early.next(now_ns, names_rev))
             .map(|(message, _)| (message.source, message.seq))

@@ -1,5 +1,5 @@
-//! Links of `/tf` and poses of the bodies that hang on them. In: messages, the sources that read them. Out: poses on
-//! the shelf.
+//! Links of `/tf`, and poses of the bodies at the end of their chains. In: messages, the sources that read them. Out:
+//! poses on the shelf.
 
 use super::super::poses::{Receipt, Source};
 use super::super::shared::Shared;
@@ -7,10 +7,10 @@ use super::super::shelf::{Shelf, Update};
 use crate::wire::name_str;
 use crate::wire::ros::TfMessage;
 
-/// Takes the links of a message for the sources at these places.
+/// Takes the links of a message for the sources with these indices.
 ///
-/// What one of them has moved since the last look, and moves now once more, is looked at in between where it is part of
-/// a way.
+/// If a link has changed since the last look and changes again, poses of continuous bodies are looked up in between,
+/// since each pose is part of a path.
 pub(super) fn take_links(
     (sources, places): (&mut [Source], impl Iterator<Item = usize>),
     (shelf, shared): (&Shelf, &Shared),
@@ -32,7 +32,7 @@ pub(super) fn take_links(
     }
 }
 
-/// Hands on the poses of bodies of a source whose chains have changed; whether there are any.
+/// Hands on the poses of a source's bodies whose chains have changed; returns whether there are any.
 pub(super) fn look_at(
     (source, place): (&mut Source, usize),
     shelf: &Shelf,
@@ -112,7 +112,7 @@ mod tests {
         }
     }
 
-    /// The number of the frame that comes of a round with three links of a body and the one that it hangs on.
+    /// The number of the frame from a round with three links of a body and of its parent frame.
     fn number(continuous: bool) -> u64 {
         let (mut sources, shelf, mut updates) = ([source(continuous)], Shelf::default(), vec![]);
         shelf.add_group(sources[0].name, 9, sources[0].seats());
@@ -136,7 +136,7 @@ mod tests {
         take(&link("world", "base", MS), false);
         for stamp_ns in [MS, 2 * MS, 3 * MS] {
             take(&link("base", "tool", stamp_ns), false);
-            // Nobody hangs on this.
+            // No body depends on this link.
             take(&link("base", "flag", MS), true);
         }
         assert!(look_at((&mut sources[0], 0), &shelf, receipt, &mut updates));

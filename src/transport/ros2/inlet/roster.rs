@@ -1,6 +1,6 @@
-//! Bodies that come and go while the node runs: their places, their subscriptions.
+//! Bodies that edits add and remove while the node runs: their members and subscriptions.
 //!
-//! In: what edits did, with the subscriptions that the sending thread made. Out: lines and places in step with the
+//! In: changes by edits, with the subscriptions that the sending thread made. Out: lines and members that match the
 //! scene.
 
 use std::collections::BTreeSet;
@@ -15,11 +15,11 @@ use super::Inlet;
 use crate::config::RosKind;
 use crate::transport::{BodyChange, BodyNote};
 
-/// Token of lines that came later: it only wakes, and every round looks at every line.
+/// Token of lines added later: it only wakes the thread, since every round looks at every line.
 const LATER: Token = Token(usize::MAX - 1);
 
 impl Inlet {
-    /// Bodies that edits put, changed or took out.
+    /// Applies changes of bodies by edits.
     pub(super) fn follow_edits(&mut self) {
         let arrivals = std::mem::take(&mut *open(&self.shared.arrivals));
         for Arrival { change, line } in arrivals {
@@ -61,14 +61,14 @@ impl Inlet {
         }
     }
 
-    /// Lines that nobody is woken for are tried again.
+    /// Registers lines again whose registration failed.
     pub(super) fn wake_for_all(&mut self) {
         for line in self.lines.iter_mut().filter(|line| line.is_unwoken()) {
             line.wake_by(self.poll.registry(), LATER);
         }
     }
 
-    /// Bodies of topics of their own that have no subscription.
+    /// Texts about bodies with their own topic that have no subscription.
     pub(super) fn unheard(&self) -> Vec<String> {
         let fed = self.lines.iter().filter_map(Line::feeder);
         let fed: BTreeSet<_> = fed.map(|f| (f.source, f.member)).collect();
@@ -84,7 +84,7 @@ impl Inlet {
             .collect()
     }
 
-    /// Topics of which one moves two bodies: a scene file is refused for it, edits can bring it about.
+    /// Texts about topics that move two bodies: scene files with these are refused, but edits can cause them.
     pub(super) fn shared_topics(&self) -> Vec<String> {
         let mut topics: Vec<&str> = (self.lines.iter())
             .filter_map(|line| Some(line.feeder()?.topic.as_str()))
@@ -101,7 +101,7 @@ impl Inlet {
     }
 }
 
-/// Gives a body that is heard where it was its new seat, and keeps what is known and what waits of it.
+/// Gives a body that keeps its frame and topic its new seat; its state and its waiting poses are kept.
 ///
 /// * returns - whether it is such a body.
 fn keep(sources: &mut [Source], shelf: &Shelf, body: &BodyNote) -> bool {
@@ -114,7 +114,7 @@ fn keep(sources: &mut [Source], shelf: &Shelf, body: &BodyNote) -> bool {
     kept.is_some()
 }
 
-/// A body hangs on another one now, which moves it, or does no more: then it stays until its own source's next pose.
+/// Attaches a body to another one, which moves it, or detaches it: then it stays until its own source's next pose.
 fn hang(sources: &mut [Source], shelf: &Shelf, name: &str, attached: bool) {
     for (at, source) in sources.iter_mut().enumerate() {
         if let Some((member, seat)) = source.hang_body(name, attached) {
@@ -167,7 +167,7 @@ mod tests {
         Source::of(&scene).remove(0)
     }
 
-    /// A pose with this stamp; what it says of the body.
+    /// Takes a pose with this stamp; returns the update.
     fn send(source: &mut Source, shelf: &Shelf, stamp_ns: u64) {
         let mut message = PoseStamped::default();
         message.header.frame_id = "world".to_owned();
@@ -190,7 +190,7 @@ mod tests {
         shelf.add_group(sources[0].name, 9, sources[0].seats());
         send(&mut sources[0], &shelf, 100 * MS);
         assert!(keep(&mut sources, &shelf, &body(7)));
-        // Late, and late it stays.
+        // A late pose stays late.
         send(&mut sources[0], &shelf, 90 * MS);
         let mut inbox = Inbox::default();
         shelf.drain(&mut inbox);

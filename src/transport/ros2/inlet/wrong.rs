@@ -1,6 +1,6 @@
-//! What is wrong with frames of `~/transforms`, in words, and what to write instead: all that a sender is told of them.
+//! Texts about faulty frames of `~/transforms`, with the fix: a sender gets no other report.
 //!
-//! In: messages, what the scene has. Out: why the node refuses one, and the newest fault of each source.
+//! In: messages, the scene's sources and bodies. Out: the reason for a refusal, and the newest fault of each source.
 
 use std::collections::BTreeMap;
 
@@ -14,17 +14,17 @@ use crate::limits::FRAME_ROWS_MAX;
 use crate::wire::ros::{BodyTransform, BodyTransforms, Book, Twist};
 use crate::wire::{RejectReason, frame_flags};
 
-/// A frame is heard within this time of its sending, nanoseconds, or `sent_ns` is of another clock.
+/// Longest plausible time between sending and receipt of a frame, nanoseconds; beyond it `sent_ns` is of another clock.
 const SENT_OFF_NS: u64 = 1_000_000_000;
-/// Sources named at most where one is missing.
+/// Most sources listed in the text about an unknown one.
 const SOURCES_TOLD_MAX: usize = 8;
 
-/// What is wrong with a frame.
+/// A fault of a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Wrong {
-    /// In words.
+    /// Its text.
     Said(String),
-    /// A name that no body has, and who sends it: the nearest is looked for when it is told, not frame by frame.
+    /// A name that no body has, and the source: the nearest name is searched only when the fault is reported.
     NoBody { name: String, source: String },
 }
 
@@ -45,19 +45,19 @@ impl Wrong {
     }
 }
 
-/// What frames are held against.
+/// Data of the scene that frames are checked against.
 #[derive(Clone, Debug, Default)]
 pub(in super::super) struct Local {
     /// The scene's frame.
     pub(super) frame_id: String,
     /// The scene's sources by name, in its order.
     pub(super) sources: Vec<String>,
-    /// This run of the daemon.
+    /// Boot id of this run of the daemon.
     pub(super) boot_id: u64,
 }
 
 impl Local {
-    /// Of a scene, in this run of the daemon.
+    /// The data of a scene in this run of the daemon.
     pub(in super::super) fn of(scene: &RosScene, boot_id: u64) -> Self {
         let sources = scene.sources.iter();
         Self {
@@ -67,13 +67,13 @@ impl Local {
         }
     }
 
-    /// The place of a source in the scene.
+    /// Index of a source in the scene.
     pub(super) fn place(&self, source: &str) -> Option<usize> {
         self.sources.iter().position(|own| own == source)
     }
 
-    /// Why the node refuses a frame as a whole: it is not in the scene's frame, or names bodies by ids that are of
-    /// another run of the daemon, where they may be other bodies'.
+    /// The reason why the node refuses a frame as a whole: it is not in the scene's frame, or it names bodies by ids of
+    /// another run of the daemon, in which they may belong to other bodies.
     pub(super) fn refuse(&self, message: &BodyTransforms) -> Option<(RejectReason, String)> {
         let source = brief(&message.source);
         let given = plain(&message.header.frame_id);
@@ -96,7 +96,7 @@ impl Local {
         Some((RejectReason::SessionOver, text))
     }
 
-    /// Why the daemon refuses a frame as a whole, as far as its head says it.
+    /// The reason why the daemon will refuse a frame as a whole, as far as it follows from the header.
     pub(super) fn fault(&self, message: &BodyTransforms) -> Option<String> {
         let source = brief(&message.source);
         if self.place(&message.source).is_none() {
@@ -131,8 +131,8 @@ impl Local {
         Some(format!("frames of source {source} are refused: {what}"))
     }
 
-    /// What is wrong with a frame whose other bodies are taken as they come: a pose that is none, a body that the scene
-    /// lacks or another source moves, or a stamp far from the node's clock where it is said to be of that.
+    /// Faults of single rows of an accepted frame: an invalid pose, a body that does not exist or that another source
+    /// moves, or a stamp far from the node's clock if the frame claims that clock.
     pub(super) fn odd(
         &self,
         message: &BodyTransforms,
@@ -214,7 +214,7 @@ impl Local {
     }
 }
 
-/// What is wrong with when a frame is said to have been sent, on `CLOCK_BOOTTIME` of this machine; 0 says nothing.
+/// Fault of `sent_ns`, which must be on `CLOCK_BOOTTIME` of this machine; 0 is not checked.
 fn sent(source: &str, sent_ns: u64, now_ns: u64) -> Option<String> {
     let (ahead, behind) = (
         sent_ns.saturating_sub(now_ns),
@@ -235,7 +235,7 @@ fn sent(source: &str, sent_ns: u64, now_ns: u64) -> Option<String> {
     }
 }
 
-/// The newest that is wrong with the frames of each source; of all that the scene lacks as of one.
+/// The newest fault of each source's frames; all unknown sources share one entry.
 #[derive(Debug, Default)]
 pub(super) struct Wrongs {
     newest: BTreeMap<Option<usize>, (Wrong, u64)>,
@@ -243,7 +243,7 @@ pub(super) struct Wrongs {
 }
 
 impl Wrongs {
-    /// Takes note of a frame, and of what is wrong with it.
+    /// Records a frame and its fault.
     pub(super) fn note(
         &mut self,
         local: &Local,
@@ -260,7 +260,7 @@ impl Wrongs {
         }
     }
 
-    /// Words for a frame that is not newer than the one before of its session.
+    /// Text about a frame that is not newer than the previous one of its session.
     fn old(&mut self, place: usize, message: &BodyTransforms) -> Option<String> {
         let order = (message.epoch, message.seq);
         let (session, newest) = self.orders.entry(place).or_insert((0, order));
@@ -274,9 +274,9 @@ impl Wrongs {
         None
     }
 
-    /// What is wrong now, in words.
+    /// Texts of the current faults.
     ///
-    /// * `young_ns` - what is older than this is over, nanoseconds.
+    /// * `young_ns` - faults older than this are over, nanoseconds.
     pub(super) fn words(&mut self, book: &Book, now_ns: u64, young_ns: u64) -> Vec<String> {
         let is_young = |at_ns: u64| now_ns.saturating_sub(at_ns) < young_ns;
         self.newest.retain(|_, (_, at_ns)| is_young(*at_ns));

@@ -1,6 +1,6 @@
-//! Topics that bodies have of their own: given out when a body comes, given back when the last body of one has left.
+//! Topics of single bodies: a name is claimed for the first body of a topic, and released with the last one.
 //!
-//! In: bodies. Out: names of topics, and which of them nobody has any more.
+//! In: bodies. Out: names of topics, and those that are no longer used.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,12 +15,12 @@ pub(in super::super) struct Topics {
     of: BTreeMap<String, Topic>,
 }
 
-/// A topic that a body has.
+/// The topic of a body.
 #[derive(Clone, Debug)]
 struct Topic {
-    /// Place of the body's source.
+    /// Index of the body's source.
     source: usize,
-    /// Its name as the body says it.
+    /// Its name as given by the body.
     given: String,
     full: String,
     /// Whether there is a subscription.
@@ -28,10 +28,10 @@ struct Topic {
 }
 
 impl Topics {
-    /// Those of a scene, whose names have been given out. A body whose topic is another thing's has none.
+    /// The topics of a scene's bodies, whose names have been claimed. A body whose topic collides has none.
     ///
-    /// * `fed` - the bodies that have a subscription: place of the source among those of common topics, and the body's
-    ///   own among those of the source. Two bodies may have one topic, and only one of them a subscription.
+    /// * `fed` - the bodies that have a subscription: index of the source among those of common topics, and index of
+    ///   the body within the source. Of two bodies with one topic, only one may have a subscription.
     pub(in super::super) fn of(
         scene: &RosScene,
         names: &Names,
@@ -58,10 +58,10 @@ impl Topics {
         Self { of: own.collect() }
     }
 
-    /// Gives a body its topic; its full name.
+    /// Claims the topic of a body; returns its full name.
     ///
     /// # Errors
-    /// One text, when it is no name or another thing has it.
+    /// One text, if it is not a valid name or is used for something else.
     pub(super) fn put(&mut self, body: &BodyNote, names: &mut Names) -> Result<String, String> {
         let full = names.claim_for_body(&body.topic)?;
         let topic = Topic {
@@ -74,20 +74,20 @@ impl Topics {
         Ok(full)
     }
 
-    /// There is a subscription to the topic of a body.
+    /// Records that the topic of a body has a subscription.
     pub(super) fn note_heard(&mut self, body: &str) {
         if let Some(topic) = self.of.get_mut(body) {
             topic.heard = true;
         }
     }
 
-    /// Whether a body of this name is heard already where this one is to be.
+    /// Whether a body of this name already has a subscription with the same source and topic.
     pub(super) fn hears(&self, body: &BodyNote) -> bool {
         let own = self.of.get(&body.name).filter(|topic| topic.heard);
         own.is_some_and(|own| (Some(own.source), &own.given) == (body.source, &body.topic))
     }
 
-    /// A body has left, or comes anew: the topic it had, where no other body has it.
+    /// Removes a body; returns its topic if no other body uses it.
     pub(super) fn remove(&mut self, body: &str, names: &mut Names) -> Option<String> {
         let topic = self.of.remove(body)?.full;
         if self.of.values().any(|other| other.full == topic) {
@@ -177,7 +177,7 @@ mod tests {
             ..body(name, "/p")
         };
         let scene = RosScene {
-            // The first is one of shared memory, which has no place among the others.
+            // The first source is one of shared memory, which is not among those of common topics.
             sources: vec![source(None), source(Some(RosKind::Pose))],
             bodies: vec![of("wall", None), of("a", Some(1)), of("b", Some(1))],
             ..RosScene::default()

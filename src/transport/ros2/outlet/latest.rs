@@ -1,21 +1,21 @@
-//! The ticks that `/diagnostics` is made of. In: parcels. Out: a row whose counts are those of a tick that has ended.
+//! The tick behind `/diagnostics`. In: parcels. Out: a tick row with the counts of a completed tick.
 
 use super::super::parcel::Parcel;
 use crate::wire::TickRow;
 
-/// The newest tick that has ended, and what was told from within the next one.
+/// The newest completed tick, and the state published during the next one.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in super::super) struct Latest {
-    /// Tick 0: none has.
+    /// Tick 0: none yet.
     ended: TickRow,
-    /// State and reasons of the one that is under way.
+    /// State and reasons of the tick in progress.
     under_way: Option<(u8, u32)>,
-    /// Whether it has ended since it was last asked for.
+    /// Whether it was completed since the last call.
     is_new: bool,
 }
 
 impl Latest {
-    /// Takes note of a tick that goes out.
+    /// Records a tick that is published.
     pub(super) fn take(&mut self, parcel: &Parcel) {
         let tick = &parcel.tick;
         if parcel.done {
@@ -25,15 +25,15 @@ impl Latest {
         }
     }
 
-    /// Whether a tick has ended yet.
+    /// Whether any tick has been completed.
     pub(super) fn is_there(&self) -> bool {
         self.ended.header.tick > 0
     }
 
-    /// The newest tick that has ended; in the state of the one that is under way where none has since the last call.
+    /// The newest completed tick; with the state of the tick in progress if none was completed since the last call.
     ///
-    /// One that is under way has no counts and no sources: against them all that was ever missed or refused would be
-    /// news with the next one, and every source would send.
+    /// A tick in progress has no counts and no sources. Compared with these, all counts of the next tick would seem
+    /// new, and every source active.
     pub(super) fn row(&mut self) -> TickRow {
         let mut row = self.ended;
         if !std::mem::take(&mut self.is_new)
@@ -74,11 +74,11 @@ mod tests {
             let levels: Vec<u8> = all.status.iter().map(|status| status.level).collect();
             levels
         };
-        // The source has never sent.
+        // The source has not sent yet.
         latest.take(&parcel);
         latest.take(&beat);
         assert_eq!(levels(&mut latest), [OK, OK, ERROR, OK]);
-        // No tick has ended for a second: what is known is that nothing is decided.
+        // No tick was completed for a second: the state is that of the tick in progress.
         assert_eq!(levels(&mut latest), [ERROR, OK, ERROR, OK]);
         latest.take(&parcel);
         assert_eq!(levels(&mut latest), [OK, OK, ERROR, OK]);

@@ -1,8 +1,8 @@
-//! A latched topic of which every message must come out: what its writer does not take yet is published again until it
-//! does, because nothing that comes later would say it. Where a reader has stopped, or the writer keeps too few
-//! messages for those that come late, a new writer says all of it anew.
+//! A latched topic that loses no message: what the writer does not accept is published again until it does, because no
+//! later message repeats it. If a reader has stopped, or the writer keeps too few messages for late joiners, a new
+//! writer publishes the whole content again.
 //!
-//! In: what a topic says from now on. Out: its messages, in order.
+//! In: the new content of a topic. Out: its messages, in order.
 
 use ros2_client::{Context, Node, Publisher, WriteError};
 use serde::Serialize;
@@ -11,10 +11,10 @@ use super::super::topics::{Out, TypeName, publisher};
 use super::super::wheel::{CATCH_UP_NS, Means};
 use crate::error::Result;
 
-/// A writer that keeps more than so many words gives way to one that keeps one or two.
+/// A writer that keeps more than this many versions of the content is replaced by one that keeps one or two.
 const WORDS_KEPT_MAX: usize = 4;
 
-/// A writer and what it has not taken.
+/// A writer, and the messages that it has not accepted yet.
 pub(in super::super) struct Owed<M: Serialize> {
     writer: Publisher<M>,
     full_name: String,
@@ -22,16 +22,16 @@ pub(in super::super) struct Owed<M: Serialize> {
     out: Out,
     /// Messages that the first writer keeps.
     depth_least: usize,
-    /// What the topic says from now on; empty as soon as the writer has taken all.
+    /// The content of the topic; empty as soon as the writer has accepted all.
     word: Vec<M>,
-    /// How many of these the writer has taken.
+    /// Number of these that the writer has accepted.
     taken: usize,
-    /// Since when the writer has been full, nanoseconds of `CLOCK_BOOTTIME`.
+    /// Time since which the writer has been full, nanoseconds of `CLOCK_BOOTTIME`.
     full_ns: Option<u64>,
 }
 
 impl<M: Serialize + Clone> Owed<M> {
-    /// Creates the first writer; nothing to say yet.
+    /// Creates the first writer, without content.
     ///
     /// # Errors
     /// `Error::Io` when DDS refuses.
@@ -53,27 +53,27 @@ impl<M: Serialize + Clone> Owed<M> {
         })
     }
 
-    /// Says this from now on; what of the last word has not been taken is void.
+    /// Sets the content; messages of the last content that were not accepted are dropped.
     ///
-    /// * returns - messages that are lost.
+    /// * returns - number of lost messages.
     pub(in super::super) fn say(&mut self, word: Vec<M>, with: &mut Means<'_>) -> u64 {
         (self.word, self.taken) = (word, 0);
         let depth = self.word.len().next_power_of_two().max(self.depth_least);
-        // Or late joiners lack a part; or they get many words of before, which nobody needs.
+        // Otherwise late joiners would lack a part, or get many outdated versions.
         if self.word.len() > self.out.depth || self.out.depth > WORDS_KEPT_MAX * depth {
             self.turn(Out { depth, ..self.out }, with);
         }
         self.hand_over(with)
     }
 
-    /// Whether the writer has not taken all.
+    /// Whether the writer has not accepted all messages.
     pub(in super::super) fn holds(&self) -> bool {
         !self.word.is_empty()
     }
 
-    /// Publishes what the writer takes now, on a new writer where a reader has stopped.
+    /// Publishes the messages that the writer accepts now; on a new writer if a reader has stopped.
     ///
-    /// * returns - messages that are lost.
+    /// * returns - number of lost messages.
     pub(in super::super) fn hand_over(&mut self, with: &mut Means<'_>) -> u64 {
         let mut lost = 0;
         while let Some(message) = self.word.get(self.taken) {
@@ -89,20 +89,20 @@ impl<M: Serialize + Clone> Owed<M> {
             }
             (self.taken, self.full_ns) = (self.taken + 1, None);
         }
-        // Not kept: of a large scene it is as much as all names.
+        // Its memory is freed: for a large scene it is as large as all names.
         (self.word, self.taken) = (Vec::new(), 0);
         lost
     }
 
-    /// Whether the writer has been full for longer than a reader that has just come takes to catch up.
+    /// Whether the writer has been full for longer than a new reader takes to catch up.
     fn is_stuck(&mut self, with: &Means<'_>) -> bool {
         let full_ns = *self.full_ns.get_or_insert(with.now_ns);
         with.now_ns.saturating_sub(full_ns) >= CATCH_UP_NS
     }
 
-    /// Goes on with a new writer, which says all of the word; whether there is one.
+    /// Continues with a new writer, which publishes the whole content; returns whether it could be created.
     ///
-    /// Its readers get it all because it is latched, so nothing is lost with the old one.
+    /// The topic is latched, so readers get the whole content, and nothing is lost with the old writer.
     fn turn(&mut self, out: Out, with: &mut Means<'_>) -> bool {
         let topic = (self.full_name.as_str(), self.kind);
         let Ok(writer) = publisher(with.node, with.context, topic, out) else {

@@ -1,4 +1,4 @@
-//! The topics that go out, each with its quality of service and the bound of what its writer keeps.
+//! The published topics, each with its quality of service and the limit of messages that its writer keeps.
 
 use std::time::Duration;
 
@@ -11,13 +11,13 @@ use super::owed::Owed;
 use crate::error::{Error, Result};
 use crate::wire::ros;
 
-/// Messages of names kept for late joiners, at first: so many revisions of a scene of some thousand bodies. One of more
-/// has a writer that keeps one or two revisions. Those who come late get what is kept, the oldest first.
+/// Messages of names kept for late joiners at first, one per revision of a scene of some thousand bodies. For larger
+/// scenes a writer keeps one or two revisions. Late joiners get the kept messages, oldest first.
 const NAMES_DEPTH: usize = 4;
-/// Bytes of a state, of a tick, and of each of its sources: a reader that has stopped may hold 16 thousand states and,
-/// of a scene with one source, 8 thousand ticks, which is 20 s at 400 Hz, and its lease has ended. So these topics keep
-/// one writer, as watchers of a node expect; only above 400 Hz, and only beside a stopped reader, does a new one go on.
-/// A reader that comes later holds them up until it has caught up, for which their messages wait.
+/// Bytes of a state, of a tick, and of each source in it. For a stopped reader a writer keeps up to 16 thousand states,
+/// or 8 thousand ticks of a scene with one source: 20 s at 400 Hz, and by then the reader's lease has ended. So these
+/// topics keep one writer, as tools expect; a new one replaces it only above 400 Hz with a stopped reader. A new reader
+/// delays them until it has caught up; their messages wait meanwhile.
 const STATE_BYTES: usize = 512;
 /// As [`STATE_BYTES`].
 const TICK_BYTES: usize = 832;
@@ -41,18 +41,18 @@ pub(in super::super) struct Publishers {
 impl Publishers {
     /// Creates them.
     ///
-    /// * `heartbeat_ns`, `sources_len` - of the scene.
-    /// * `reliable` - whether pairs and contacts that were lost are sent again.
+    /// * `heartbeat_ns`, `sources_len` - heartbeat and number of sources of the scene.
+    /// * `reliable` - whether lost pairs and contacts are sent again.
     ///
     /// # Errors
-    /// `Error::Usage` when remaps collide; `Error::Io` when DDS refuses.
+    /// `Error::Usage` if remaps collide; `Error::Io` if DDS refuses.
     pub(in super::super) fn create(
         (node, context, names): (&mut Node, &Context, &mut Names),
         (heartbeat_ns, sources_len): (u64, usize),
         reliable: bool,
     ) -> Result<Self> {
         let mut claim = |name: &str| names.claim(name).map_err(Error::Usage);
-        // Silence of the node itself is told by the deadline and by the lease.
+        // Readers notice silence of the node by the deadline and by the lease.
         let watched = |bytes| Out {
             deadline: Some(Duration::from_nanos(heartbeat_ns.saturating_mul(2))),
             bytes,
@@ -133,14 +133,14 @@ impl Publishers {
         })
     }
 
-    /// Whether a writer has not taken all.
+    /// Whether a writer has not accepted all messages.
     pub(super) fn hold(&self) -> bool {
         let rows = self.contacts.holds() || self.pairs.holds();
         let shown = self.collisions.holds() || self.markers.holds();
         rows || shown || self.state.holds() || self.tick.holds() || self.names.holds()
     }
 
-    /// What writers have lost since the last call, by topic.
+    /// Messages lost by writers since the last call, by topic.
     pub(super) fn take_lost(&mut self) -> Vec<(String, u64)> {
         let lost = [
             self.pairs.take_lost(),
@@ -153,7 +153,7 @@ impl Publishers {
         lost.into_iter().filter(|(_, lost)| *lost > 0).collect()
     }
 
-    /// Sets whether pairs and contacts that were lost are sent again.
+    /// Sets whether lost pairs and contacts are sent again.
     pub(super) fn set_reliable(&mut self, with: &mut Means<'_>, reliable: bool) {
         self.pairs.set_reliable(with, reliable);
         self.contacts.set_reliable(with, reliable);

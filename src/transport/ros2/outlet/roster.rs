@@ -1,7 +1,7 @@
-//! Bodies that come, change and go while the node runs: their boxes, and the subscriptions that they need.
+//! Bodies that edits add, change and remove while the node runs: their boxes and subscriptions.
 //!
-//! In: what edits did. Out: subscriptions for the receiving thread; a body that is heard where it was keeps its own,
-//! and one whose subscription failed is tried again.
+//! In: changes by edits. Out: subscriptions for the receiving thread. A body with an unchanged topic keeps its
+//! subscription, and a failed one is tried again.
 
 use std::collections::VecDeque;
 
@@ -16,7 +16,7 @@ use crate::error::Error;
 use crate::time::{Clock as _, SystemClock};
 use crate::transport::{BodyChange, BodyNote};
 
-/// Between two tries of bodies whose subscription failed, nanoseconds.
+/// Time between two tries of failed subscriptions, nanoseconds.
 const RETRY_NS: u64 = 1_000_000_000;
 /// Bodies tried again at a time: each that fails again costs a look for files.
 const RETRIES_MAX: usize = 8;
@@ -35,7 +35,7 @@ pub(in super::super) struct Unheard {
 }
 
 impl Unheard {
-    /// Those of a scene that was opened all the same.
+    /// The bodies of a scene that was opened in spite of failed subscriptions.
     pub(in super::super) fn of(scene: &RosScene, topics: &Topics) -> Self {
         let is_one = |body: &&BodyNote| {
             let source = body.source.and_then(|place| scene.sources.get(place));
@@ -75,7 +75,7 @@ impl Unheard {
 }
 
 impl Outlet {
-    /// Boxes and subscriptions of bodies that edits put: only this thread has the node.
+    /// Updates boxes and subscriptions after edits: only this thread has the node.
     ///
     /// Cost: at most [`TRIES_NS`] and one subscription more; bodies that are left are subscribed to at the next call.
     pub(super) fn follow_edits(&mut self) {
@@ -88,7 +88,7 @@ impl Outlet {
                         Some(bounds) => self.boxes.insert(body.id, bounds),
                         None => self.boxes.remove(&body.id),
                     };
-                    // A second subscription takes files that may not be there, and until it is found nothing comes.
+                    // A second subscription needs files, and receives nothing until it is discovered.
                     let stays = self.topics.hears(body);
                     (!stays).then(|| self.meet(body, until_ns)).flatten()
                 }
@@ -107,7 +107,7 @@ impl Outlet {
         self.try_again(SystemClock.boottime_ns(), until_ns);
     }
 
-    /// Takes a body that came, or is heard elsewhere now; the subscription it needs, if it needs one and time is left.
+    /// Takes a body that is new or has another topic; returns its subscription, if it needs one and time is left.
     fn meet(&mut self, body: &BodyNote, until_ns: u64) -> Option<Line> {
         self.part(&body.name);
         // An earlier body that still waits comes first.
@@ -118,7 +118,7 @@ impl Outlet {
         self.subscribe(body, "")
     }
 
-    /// Bodies that came when no time was left to subscribe.
+    /// Subscribes for bodies that came when no time was left.
     fn try_untried(&mut self, until_ns: u64) {
         while !is_over(until_ns)
             && let Some(body) = self.unheard.untried.pop_front()
@@ -129,7 +129,7 @@ impl Outlet {
         }
     }
 
-    /// Bodies whose subscription failed: what was in its way may be gone.
+    /// Tries failed subscriptions again.
     fn try_again(&mut self, now_ns: u64, until_ns: u64) {
         let mut due = self.unheard.due(now_ns);
         while !is_over(until_ns)
@@ -184,7 +184,7 @@ impl Outlet {
         }
     }
 
-    /// Gives back the topic of a body that has left, or comes anew.
+    /// Releases the topic of a body that was removed or is put again.
     fn part(&mut self, name: &str) {
         self.unheard.remove(name);
         if let Some(topic) = self.topics.remove(name, &mut self.names) {

@@ -1,23 +1,23 @@
-//! What DDS did not send, told once a second with the topics it was of. In: the count of all that was not sent, and
-//! what writers lost. Out: words.
+//! Reports of messages that DDS did not send, once a second, with their topics. In: the count of unsent messages, and
+//! the losses of writers. Out: texts.
 
 use super::super::shared::{Say, Shared};
 use super::publishers::Publishers;
 
-/// Between two looks, nanoseconds.
+/// Time between two looks, nanoseconds.
 const LOOK_NS: u64 = 1_000_000_000;
 
-/// What was told.
+/// The last report.
 #[derive(Clone, Debug, Default)]
 pub(in super::super) struct Unsent {
     all: u64,
     looked_ns: u64,
-    /// Of the last look, for `/diagnostics`; `None`: all was sent.
+    /// Text of the last look, for `/diagnostics`; `None`: all was sent.
     pub(super) words: Option<String>,
 }
 
 impl Unsent {
-    /// Looks once a second, and says what is new.
+    /// Looks once a second, and reports new losses.
     ///
     /// * `now_ns` - nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) fn look(&mut self, publishers: &mut Publishers, shared: &Shared, now_ns: u64) {
@@ -36,8 +36,8 @@ impl Unsent {
     }
 }
 
-/// * `lost` - messages of all topics, and ticks that gave way to newer ones before they were messages.
-/// * `topics` - what writers lost, by topic.
+/// * `lost` - lost messages of all topics, and ticks that were replaced by newer ones before they were published.
+/// * `topics` - messages lost by writers, by topic.
 fn words(lost: u64, topics: &[(String, u64)]) -> String {
     let mut of: Vec<String> = (topics.iter())
         .map(|(topic, lost)| format!("{lost} of {topic}"))
